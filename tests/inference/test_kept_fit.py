@@ -2,6 +2,7 @@
 
 import jax
 import numpy as np
+from commands import XB1
 from short import SHORT
 
 import hdcal
@@ -10,7 +11,7 @@ from hdcal.prediction.engine.causes import causes_of
 
 
 def test_the_fit_is_read_and_not_made_again(tmp_path, monkeypatch):
-    case = hdcal.read_case("datasets/xb1-100-80")
+    case = hdcal.read_case(XB1)
     hdcal.calibrate(case, **SHORT).save(tmp_path / "posterior.nc")
     (cause,) = causes_of(hdcal.Posterior.load(tmp_path))
     fitted = laplace.fit(cause.problem)
