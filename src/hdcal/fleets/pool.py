@@ -72,7 +72,8 @@ class Pool:
         self.parts.append(each.assign(reach=largest_of(of_row, np.abs(read))))
 
     def _show(self, parts: list[Measurements]) -> None:
-        """Keep rows while they are among the first."""
+        """Keep rows while they are among the first of gears that are not left out."""
+        parts, self.shown = [*self.shown, *parts], []
         for part in parts:
             bad = part.frame["specimen"].isin([*self.left_out])
             part = part.where(~bad.to_numpy())
