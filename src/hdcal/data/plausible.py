@@ -65,7 +65,7 @@ RANGES = {
     "expanded_percent": Range(1e-6, 20.0, "%", "no gauge with a certificate is worse"),
     "expanded_K": Range(1e-6, 50.0, "K", "no gauge with a certificate is worse"),
     "k": Range(1.0, 5.0, "", "from a standard uncertainty to beyond every table"),
-    # the gear and what is believed of it
+    # the gear and its priors
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
     "load_cell_capacity": Range(

@@ -1,4 +1,4 @@
-"""What is believed about one parameter, as a typed pytree."""
+"""The prior of one parameter, as a typed pytree."""
 
 import equinox as eqx
 from jax import Array
@@ -16,7 +16,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 
 
 class Prior(eqx.Module):
-    """What is believed about one parameter before the data, in code units.
+    """The prior of one parameter, in code units.
 
     Attributes:
         family: a key of FAMILIES.

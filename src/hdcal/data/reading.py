@@ -19,8 +19,8 @@ from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
-_BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
-# What is told where no gear file was named, and none lies beside the data.
+_NEARBY = f"the gear file is the {GEAR_NAME} beside the data"
+# The note where no gear file was named, and none lies beside the data.
 UNSIZED = (
     f"{ASSUMED}the part is a spring of which nothing is known but these readings: its "
     "stiffness is asked, no K. K needs sizes, stated in a gear file, named or as "
@@ -61,7 +61,7 @@ def read_case(
         sheet: of a workbook (.xlsx); by default the one with readings. With an
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
         reading: of the deformation, `radial` or `diametral`, where the gear file is
-            silent; by default it is taken for radial, and said to be so.
+            silent; by default it is taken for radial, and a note says so.
         specimen: label of the one whose rows are wanted; by default all of them.
         skip_bad: leave out specimens of which a row is wrong, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
@@ -84,9 +84,9 @@ def read_case(
     with Findings() as wrong:
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
-        beside = None if in_memory else Path(table).parent / GEAR_NAME
+        nearby = None if in_memory else Path(table).parent / GEAR_NAME
         asked = (theory, material, reading)
-        found = of_gear.attempt(gear_of, gear, beside, folder, asked)
+        found = of_gear.attempt(gear_of, gear, nearby, folder, asked)
         stated = found[0].source.get("columns", {}) if found is not None else {}
         how: dict = {"gear": found and found[0], "skip_bad": skip_bad}
         named = stated | columns
@@ -120,33 +120,32 @@ def asked_columns(
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
     """Return what the case, or its folder, is called: after file and parts named."""
     name = (data.resolve().name if folder else data.stem) or "case"
-    told = (str(part).replace("*", "").strip() for part in parts if part is not None)
-    named = (_NO_NAME.sub("_", part) for part in told)
-    return "-".join([name, *named])
+    texts = (str(part).replace("*", "").strip() for part in parts if part is not None)
+    return "-".join([name, *(_NO_NAME.sub("_", text) for text in texts)])
 
 
 def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
-    beside: Path | None,
+    nearby: Path | None,
     folder: bool,
     asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
-    """Return the gear of a case, and what is to be told of how it was found.
+    """Return the gear of a case, and notes on where it comes from.
 
     Args:
         gear: that was named, as in `read_case`.
-        beside: where a gear file may lie; None of a table in memory.
+        nearby: where a gear file may lie; None of a table in memory.
         folder: whether one has to lie there.
         asked: theory, material and reading, as in `read_case`.
     """
     theory, material, reading = asked
-    told = [f"the deformation is {reading}, as was asked"] if reading else []
+    notes = [f"the deformation is {reading}, as was asked"] if reading else []
+    if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
+        gear = nearby
+        notes += [] if folder else [_NEARBY]
     if gear is not None:
         found = read_gear(gear, *asked)
-        return found, (*told, *_unsaid(found))
-    if beside is not None and (folder or os.path.exists(beside)):
-        found = read_gear(beside, *asked)
-        return found, (*told, *_unsaid(found), *([] if folder else [_BESIDE]))
+        return found, (*_defaults(found), *notes)
     if theory not in (None, SPRING) or material is not None or reading is not None:
         words = "no gear file says the sizes that this needs"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
@@ -154,12 +153,12 @@ def gear_of(
 
 
 def leaves_reading_open(gear: Gear) -> bool:
-    """Tell whether a gear file is silent of radial or diametral, and K hangs on it."""
-    said = gear.source.get("measurement", {})
-    return gear.theory != SPRING and "deformation" not in said
+    """Tell whether K depends on radial or diametral, and the gear file is silent."""
+    measurement = gear.source.get("measurement", {})
+    return gear.theory != SPRING and "deformation" not in measurement
 
 
-def _unsaid(gear: Gear) -> Iterator[str]:
+def _defaults(gear: Gear) -> Iterator[str]:
     """Yield what the gear file leaves to a default that much depends on."""
     if leaves_reading_open(gear):
         yield (
@@ -168,6 +167,6 @@ def _unsaid(gear: Gear) -> Iterator[str]:
         )
     if gear.theory != SPRING and "material" not in gear.source.get("gear", {}):
         yield (
-            f"{ASSUMED}the gear is of steel. If not, which changes K and what heat "
-            "does, the gear file has to name its material"
+            f"{ASSUMED}the gear is of steel. If not, which changes K and the influence "
+            "of the temperature, the gear file has to name its material"
         )

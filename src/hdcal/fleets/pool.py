@@ -50,7 +50,7 @@ class Pool:
 
     @property
     def keys(self) -> list[str]:
-        """Labels by which rows are told apart."""
+        """Labels by which rows are grouped."""
         stated = [name for name in ("run", *GROUPINGS) if name in self.source.used]
         return ["specimen", "zero", *stated]
 
@@ -72,7 +72,8 @@ class Pool:
         self.parts.append(each.assign(reach=largest_of(of_row, np.abs(read))))
 
     def _show(self, parts: list[Measurements]) -> None:
-        """Keep rows while they are among the first."""
+        """Keep rows while they are among the first of gears that are not left out."""
+        parts, self.shown = [*self.shown, *parts], []
         for part in parts:
             bad = part.frame["specimen"].isin([*self.left_out])
             part = part.where(~bad.to_numpy())
@@ -81,7 +82,7 @@ class Pool:
                 self.shown.append(replace(part, frame=part.frame[:room]))
 
     def join(self, other: "Pool") -> None:
-        """Add what another one has, whose rows come after those of this one."""
+        """Add another one, of rows that come after those of this one."""
         self.parts += other.parts
         self.left_out = other.left_out | self.left_out
         self._show(other.shown)
@@ -193,7 +194,7 @@ def pool_of(
     whole, early, joined_files = Pool(source), {}, 0
     for place, pool in found:
         early[place] = pool
-        # In the order of the files, so that the answer hangs on no worker.
+        # In the order of the files, so that the answer depends on no worker.
         while joined_files in early:
             whole.join(early.pop(joined_files))
             joined_files += 1

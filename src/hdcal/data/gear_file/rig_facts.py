@@ -18,8 +18,8 @@ _PITCH_LOG_SD = 0.02
 # Noise is what is faster than the loading: readings err alike over a fifth of a half
 # cycle at most, so that each holds five independent stretches. Slower is a bend.
 _FAST = 0.2
-# How many neighbours that err alike a filter stands for, and what is believed of the
-# correlation where it is hardly any.
+# How many correlated neighbours a filter stands for, and the prior of the correlation
+# where it leaves hardly any.
 _AS_GOOD_AS, _UNFILTERED = 20.0, (0.5, 1.5)
 
 

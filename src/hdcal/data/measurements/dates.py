@@ -34,18 +34,18 @@ def dates_of(
     if not len(labels):
         return (), ""
     texts, place = _distinct(labels)
-    told = np.array([text != NOT_STATED for text in texts])
+    stated = texts != NOT_STATED
     times = np.full(len(texts), np.datetime64("NaT", "s"))
     note = ""
-    if told.any():
-        stated = [text for text in texts if text != NOT_STATED]
-        readings = _readings(stated)
+    if stated.any():
+        written = texts[stated]
+        readings = _readings(written)
         if len(readings) != 1:
             how = "can be read in two ways" if readings else "cannot be read as one"
-            return (), f"dates are not used: {quoted(stated[0])} {how}. {_REMEDY}"
-        times[told] = readings[0]
+            return (), f"dates are not used: {quoted(written[0])} {how}. {_REMEDY}"
+        times[stated] = readings[0]
         if np.isnat(readings[0]).any():
-            odd = quoted(stated[int(np.argmax(np.isnat(readings[0])))])
+            odd = quoted(written[int(np.argmax(np.isnat(readings[0])))])
             note = f"the date {odd} cannot be read beside the others. {_REMEDY}"
     first = np.full(int(np.max(of)) + 1, np.datetime64("NaT", "s"))
     np.fmin.at(first, of, times[place])
@@ -68,13 +68,13 @@ def days_of(labels: np.ndarray) -> np.ndarray:
     # Few days have many times.
     texts, day = _distinct([day_text(text) for text in stamps])
     days = np.full(len(texts), NOT_STATED, object)
-    told = np.flatnonzero(texts != NOT_STATED)
-    readings = _readings(texts[told]) if len(told) else []
+    stated = np.flatnonzero(texts != NOT_STATED)
+    readings = _readings(texts[stated]) if len(stated) else []
     if len(readings) > 1:
-        days[told] = texts[told]
+        days[stated] = texts[stated]
     elif readings:
         read = ~np.isnat(readings[0])
-        days[told[read]] = readings[0][read].astype("datetime64[D]").astype(str)
+        days[stated[read]] = readings[0][read].astype("datetime64[D]").astype(str)
     return days[day][place]
 
 
@@ -93,10 +93,9 @@ def _readings(texts: Sequence[str] | np.ndarray) -> list[np.ndarray]:
     import pandas as pd
 
     found: list[np.ndarray] = []
-    # What clocks there showed counts, not what they showed elsewhere; and what is said
-    # without a number is another day whenever it is read.
+    # The local time counts; and a text without a number, such as today, is no date.
     plain = pd.Series(
-        [_ZONE.sub("", text) * bool(_DIGIT.search(text)) for text in texts]
+        [_ZONE.sub("", text) if _DIGIT.search(text) else "" for text in texts]
     )
     for day in _DAYS:
         times = pd.Series(pd.NaT, index=plain.index, dtype="datetime64[s]")

@@ -84,13 +84,13 @@ def read_gear_folder(
     labels, cases = gear_labels(files, folder)
     own = [file.parent / GEAR_NAME for file in files] if cases else []
     own = own if any(path.exists() for path in own) else []
-    beside = folder / GEAR_NAME
-    if gear is None and own and not beside.exists():
+    nearby = folder / GEAR_NAME
+    if gear is None and own and not nearby.exists():
         gear = next(path for path in own if path.exists())
-    base = str(beside) if gear is None else "`gear`"
+    base = str(nearby) if gear is None else "`gear`"
     base = str(gear) if isinstance(gear, str | Path) else base
     with Findings() as wrong:
-        found, notes = wrong.attempt(gear_of, gear, beside, False, asked) or (None, ())
+        found, notes = wrong.attempt(gear_of, gear, nearby, False, asked) or (None, ())
         parts, unread = [], {}
         for place, (file, label) in enumerate(zip(files, labels, strict=True)):
             each, its = Findings(), None
@@ -111,11 +111,11 @@ def read_gear_folder(
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
     whole = joined([part.measured for part in parts], found.reference_temperature, bad)
     kind = "folder" if cases else "file"
-    told = [f"each {kind} is a gear, called after it, unless it names gears itself"]
+    about = [f"each {kind} is a gear, called after it, unless it names gears itself"]
     compared = f"the gear file, with sizes at which gears are compared, is {base}"
-    told += [*([compared] if own else []), *not_read(files, folder), *_untold(parts)]
+    about += [*([compared] if own else []), *not_read(files, folder), *_open(parts)]
     name = folder.resolve().name
-    case = case_of(whole, found, (*told, *notes), name, range, skip_bad)
+    case = case_of(whole, found, (*about, *notes), name, range, skip_bad)
     return case, _sizes(parts) if own and found.theory != SPRING else None
 
 
@@ -141,7 +141,7 @@ def joined(
     Args:
         parts: the first one names the whole.
         warm: temperature of those that state none [°C].
-        bad: gears that are not among them, beside those of the parts.
+        bad: gears that are not among them, in addition to those of the parts.
     """
     blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
     frames = [part.frame for part in parts]
@@ -190,7 +190,7 @@ def _why(first: Finding, folder: Path) -> Finding:
 
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
-    """Yield what a gear file says otherwise than that of all gears, beside sizes."""
+    """Yield what a gear file says otherwise than that of all gears, but sizes."""
     mine, theirs = (dict(_flat(each.source)) for each in (one, other))
     remedy = "Gears of one kind differ in their sizes only"
     keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
@@ -227,10 +227,10 @@ def _sizes(parts: Sequence[_Part]) -> dict[str, list]:
     return pd.DataFrame([*rows], columns=names).to_dict("list")
 
 
-def _untold(parts: Sequence[_Part]) -> Iterator[str]:
+def _open(parts: Sequence[_Part]) -> Iterator[str]:
     """Yield a note on what some files state and others do not."""
-    open_ = {"specimen", "temperature", "run", *GROUPINGS}
-    each = [part.measured.stated - open_ for part in parts]
+    known = {"specimen", "temperature", "run", *GROUPINGS}
+    each = [part.measured.stated - known for part in parts]
     for name in sorted(frozenset().union(*each) - each[0].intersection(*each)):
         many = sum(name in stated for stated in each)
         yield f"{name} is not read: {many} of {len(each)} files state it"

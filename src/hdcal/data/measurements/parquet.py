@@ -97,11 +97,11 @@ def open_parquet(
     path = Path(data)
     files = parquet_files(path)
     root = str(path) if path.is_dir() else ""
-    beside = (path if root else path.parent) / GEAR_NAME
+    nearby = (path if root else path.parent) / GEAR_NAME
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        found, notes = gear_of(gear, beside, False, (theory, None, reading))
+        found, notes = gear_of(gear, nearby, False, (theory, None, reading))
         named = {**found.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
         grid = arrow_grid(first.schema, first.column, first.num_rows, 2)

@@ -15,7 +15,7 @@ from hdcal.data.tables.grid import SEPARATORS, SourceLine, TextGrid, split_line
 LONGEST_LINE = 1 << 20
 LARGEST_FILE = 1 << 32
 _CHUNK = 1 << 18
-# Encodings that test machines write beside Unicode: Western Europe, China, Japan.
+# Encodings that test machines write other than Unicode: Western Europe, China, Japan.
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
 _WESTERN = {*"°µ²³·–äöüßÄÖÜéèêëàâçùûîïôÉÈÊÀÇñóíá"}
