@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.fleets.fleet import fleet
     from hdcal.fleets.fleet_posterior import FleetPosterior
-    from hdcal.inference.dynamic_posterior import DynamicPosterior
     from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
+    from hdcal.motion.dynamic_posterior import DynamicPosterior
     from hdcal.motion.respond.respond import respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Case": "data.case",
-    "DynamicPosterior": "inference.dynamic_posterior",
+    "DynamicPosterior": "motion.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "FleetPosterior": "fleets.fleet_posterior",

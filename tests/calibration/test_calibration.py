@@ -23,7 +23,7 @@ from hdcal.calibration.calibration import summarise
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.integrated import draw_members
+from hdcal.inference.marginal import draw_members
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
@@ -72,7 +72,6 @@ def test_a_posterior_survives_the_disk(posterior, tmp_path):
         "observed_data",
         "constant_data",
         "log_likelihood",
-        "laplace",
     }
     assert set(back.tree.children) == groups
 

@@ -47,7 +47,7 @@ def measured(read, gains, *, gear_sd=0.004, seed=0) -> pd.DataFrame:
 def fitted(table: pd.DataFrame, *without: str):
     case = hdcal.read_case(table.drop(columns=[*without]), theory="spring")
     found = hdcal.fleet(case)
-    assert not found.reasons and found.settings["sampler"] == "independent proposals"
+    assert not found.reasons and found.settings["sampler"] == "importance sampling"
     return found
 
 

@@ -14,11 +14,10 @@ from hdcal.inference.checks import (
     rounding_check,
     sampling_checks,
 )
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
-from hdcal.inference.flat_directions import dead_parameters, flat_directions
-from hdcal.inference.linearisation import linearise
-from hdcal.inference.mixing import mixing
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.identifiability import linearise, unidentified
 from hdcal.inference.problem import build_problem
+from hdcal.inference.sample import Draws
 from hdcal.physics.registry import EFFECTS
 
 RHAT, ESS, BFMI, DIVERGENT, DEPTH = range(5)
@@ -53,8 +52,10 @@ def stats_of(chains=4, draws=500, **change):
         "diverging": np.zeros((chains, draws), dtype=bool),
         "n_steps": np.full((chains, draws), 7),
     }
-    fields |= change
-    return fields
+    nothing = np.zeros((chains, draws))
+    fields |= {"values": {}, "potential": nothing, "acceptance": nothing}
+    fields |= {"step_size": nothing, "target_acceptance": 0.8}
+    return Draws(**(fields | change))
 
 
 def diagnoses_of(draws):
@@ -253,9 +254,7 @@ def test_a_known_modulus_is_no_flat_direction(good):
         problem = build_problem(case, effect_priors())
         near = linearise(problem, centre, case.records)
         slopes = {name: slope / near.sd for name, slope in near.slopes.items()}
-        for name in dead_parameters(slopes, problem):
-            del slopes[name]
-        found[len(priors)] = flat_directions(slopes, problem)
+        _, found[len(priors)] = unidentified(slopes, problem)
     assert any("told apart by" in words for words in found[0])
     assert found[2] == []
 

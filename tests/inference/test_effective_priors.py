@@ -20,7 +20,7 @@ from hdcal.inference.assembly import assemble
 from hdcal.inference.checks import conflict_check
 from hdcal.inference.density import log_prior
 from hdcal.inference.distributions import effective_priors
-from hdcal.inference.integrated import draw_members
+from hdcal.inference.marginal import draw_members
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.residuals import residuals
@@ -81,7 +81,7 @@ def posterior() -> Posterior:
     problem = build_problem(case, shipped, structure=form)
     found = near_the_mode(problem)
     priors = problem_priors(case, (), shipped, theory)
-    own = _specifics(case, problem, form, found, plain=False, shown=False)
+    own = _specifics(case, theory, problem, form, found, plain=False, shown=False)
     parts = assemble(case, priors, problem, found, own, 2)
     return Posterior(
         case, theory, (), priors, *parts, {"with_gap": False, STRUCTURE: asdict(form)}

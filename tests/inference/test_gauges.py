@@ -22,13 +22,13 @@ from hdcal.data.gear_file.certificates import (
 from hdcal.data.priors import effect_priors
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
-from hdcal.inference.dynamic_priors import dynamic_site_priors, dynamic_sites
-from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
 from hdcal.inference.gauges import with_gains
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sampled_problem import model
 from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.motion.dynamic_priors import dynamic_site_priors, dynamic_sites
+from hdcal.motion.dynamic_problem import build_dynamic, predict_motion
 
 GAUGES = {"force_gain": 0.02, "deformation_gain": -0.013, "temperature_offset": 7.0}
 

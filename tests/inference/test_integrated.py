@@ -19,11 +19,11 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.errors import InputError
-from hdcal.inference import compress, density, integrated
+from hdcal.inference import compression, density, marginal
 from hdcal.inference import values as of_draw
 from hdcal.inference.likelihood import log_probability
-from hdcal.inference.member_counts import check_member_counts, integrated_kinds
-from hdcal.inference.member_offsets import Grouped, Linear, contrasts
+from hdcal.inference.linear_gaussian import Grouped, Linear, contrasts
+from hdcal.inference.members import MEMBER_SD, MEMBERS, integrated_kinds
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sampled_problem import model
 from hdcal.inference.serial_correlation import previous_rows
@@ -123,17 +123,21 @@ def test_compressed_is_row_by_row(loading, rows, runs, specimens, sds, seed, rea
         return Base(slope[specimen], alpha, zero, offset[run], sigma)
 
     keys = records.run, records.specimen, records.force_sd, records.force_sd
-    distinct, group = compress.group_rows(*keys)
+    distinct, group = compression.group_rows(*keys)
     np.testing.assert_array_equal(distinct[group], np.stack(keys, axis=1))
     columns = linear_columns(records, reading)
-    blocks = compress.compress(columns, records.force, distinct, group)
+    blocks = compression.compress(columns, records.force, distinct, group)
     assert blocks.count.sum() == rows
     # Groups of no rows may follow.
     assert (blocks.count[: len(distinct)] > 0.0).all()
     assert (blocks.count[len(distinct) :] == 0.0).all()
     coefficients = linear_coefficients(base(blocks.run, blocks.specimen), reading)
     coefficients = jnp.broadcast_to(coefficients, (len(blocks.count), 4))
-    found = compress.log_likelihood(blocks, coefficients, sigma, step, 0.0)
+    full = np.concatenate([-coefficients, np.ones((len(blocks.count), 1))], axis=1)
+    squares = np.sum(np.einsum("gij,gj->gi", blocks.factor, full) ** 2, axis=1)
+    variance = blocks.variance(sigma, step)
+    volume = blocks.count * np.log(2.0 * np.pi * variance)
+    found = -0.5 * np.sum(volume + squares / variance)
 
     own = base(records.run, records.specimen)
     mean, noise = predict_reading(own, (), records, reading)
@@ -169,33 +173,25 @@ def test_a_compressed_problem_is_its_rows(loading, gear):
 
 def random_linear(seed, rows, weights, members=0):
     rng = np.random.default_rng(seed)
-    sd = rng.uniform(0.3, 2.0, rows)
+    grouped = None
+    if members:
+        # Some may have no row.
+        index = jnp.asarray(rng.integers(0, members, rows))
+        grouped = Grouped(index, jnp.asarray(2.0 * rng.normal(size=rows)), members)
     return Linear(
         residual=jnp.asarray(rng.normal(0.0, 2.0, rows)),
-        design=jnp.asarray(rng.normal(size=(rows, weights))),
-        sd=jnp.asarray(sd),
-        scale=jnp.asarray(rng.uniform(0.1, 3.0, weights)),
-        log_volume=jnp.asarray(np.log(sd).sum()),
-        count=rows,
-        grouped=random_members(rng, rows, members) if members else None,
+        design=jnp.asarray(rng.normal(size=(rows, weights))) * 1.5,
+        log_scale=jnp.asarray(0.5 * rows * np.log(2.0 * np.pi)),
+        grouped=grouped,
     )
 
 
-def random_members(rng, rows, members):
-    """Return members of which some may have no row."""
-    index = jnp.asarray(rng.integers(0, members, rows))
-    column = jnp.asarray(rng.normal(size=rows))
-    return Grouped(index, column, jnp.asarray(rng.uniform(0.1, 3.0)), members)
-
-
 def dense(linear):
-    """Return design, prior covariance and noise covariance as dense matrices."""
-    design, scale = np.asarray(linear.design), np.asarray(linear.scale)
+    """Return the design of members and scores as one dense matrix."""
+    design = np.asarray(linear.design)
     if linear.grouped is not None:
         design = np.hstack([linear.grouped.columns(), design])
-        own = np.full(linear.grouped.count - 1, linear.grouped.sd)
-        scale = np.concatenate([own, scale])
-    return design, np.diag(scale**2), np.diag(np.asarray(linear.sd) ** 2)
+    return design
 
 
 @pytest.mark.parametrize(
@@ -204,10 +200,10 @@ def dense(linear):
 )
 def test_the_integral_is_the_dense_density(rows, weights, members):
     linear = random_linear(rows, rows, weights, members)
-    design, prior, noise = dense(linear)
-    slow = stats.multivariate_normal(
-        np.zeros(rows), design @ prior @ design.T + noise
-    ).logpdf(linear.residual)
+    design = dense(linear)
+    covariance = design @ design.T + np.eye(rows)
+    law = stats.multivariate_normal(np.zeros(rows), covariance)
+    slow = law.logpdf(linear.residual)
     assert float(linear.log_likelihood()) == pytest.approx(slow, rel=1e-11)
 
 
@@ -217,10 +213,9 @@ def test_the_integral_is_the_dense_density(rows, weights, members):
 )
 def test_draws_are_conditional(rows, weights, members):
     linear = random_linear(rows + 1, rows, weights, members)
-    design, prior, noise = dense(linear)
-    gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + noise)
-    mean = gain @ np.asarray(linear.residual)
-    covariance = prior - gain @ design @ prior
+    design = dense(linear)
+    covariance = np.linalg.inv(np.eye(design.shape[1]) + design.T @ design)
+    mean = covariance @ design.T @ np.asarray(linear.residual)
     count = 40_000
     keys = jax.random.split(jax.random.key(rows), count)
     drawn, own = jax.jit(jax.vmap(linear.draw))(keys)
@@ -248,24 +243,21 @@ def test_members_that_spread_far_keep_their_digits(spread, eliminated):
         size=members * rows
     )
     index = np.repeat(np.arange(members), rows)
-    grouped = Grouped(index, np.ones(len(index)), np.array(spread * sd), members)
-    count = members if eliminated else 0
+    grouped = Grouped(index, np.full(len(index), spread), members)
+    none = np.zeros((len(index), 0))
+    log_scale = len(index) * np.log(sd * np.sqrt(2.0 * np.pi))
     linear = Linear(
-        residual=residual,
-        design=np.zeros((len(index), 0)) if count else np.asarray(grouped.columns()),
-        sd=np.full(len(index), sd),
-        scale=np.zeros(0) if count else np.full(members - 1, spread * sd),
-        log_volume=len(index) * np.log(sd),
-        count=len(index),
-        grouped=grouped if count else None,
+        residual / sd,
+        none if eliminated else np.asarray(grouped.columns()),
+        log_scale,
+        grouped if eliminated else None,
     )
     means = residual.reshape(members, rows).mean(axis=1)
     within = np.sum((residual - np.repeat(means, rows)) ** 2)
     between = rows * np.sum((means - means.mean()) ** 2)
     wide = sd**2 * (1.0 + rows * spread**2)
     squares = (within + len(index) * means.mean() ** 2) / sd**2 + between / wide
-    volume = (members - 1) * np.log(wide / sd**2) + 2.0 * linear.log_volume
-    exact = -0.5 * (squares + volume + len(index) * np.log(2.0 * np.pi))
+    exact = -0.5 * (squares + (members - 1) * np.log(wide / sd**2)) - log_scale
     assert float(linear.log_likelihood()) == pytest.approx(exact, abs=1e-5)
 
 
@@ -381,7 +373,7 @@ def test_a_draw_holds_what_is_said_of_it(structured):
         if site["type"] in ("sample", "deterministic") and not name.startswith("_")
     }
     values = {name: value for name, value in values.items() if name != "force"}
-    values |= jax.jit(integrated.draw_members)(problem, values, jax.random.key(0))
+    values |= jax.jit(marginal.draw_members)(problem, values, jax.random.key(0))
     shapes = {name: np.shape(value) for name, value in values.items()}
     with_gap = problem.discrepancy is not None
     assert shapes == of_draw.site_shapes(case, (), form_of(case, (), with_gap))
@@ -391,23 +383,18 @@ def test_drawn_members_explain_the_data(structured):
     """Given the members the readings scatter by σ, and deviations sum to zero."""
     case, problem = structured
     values = random_values(0)
-    drawn = jax.jit(integrated.draw_members)(problem, values, jax.random.key(0))
-    assert set(drawn) == {of_draw.MEMBERS[kind] for kind in problem.integrated}
+    drawn = jax.jit(marginal.draw_members)(problem, values, jax.random.key(0))
+    assert set(drawn) == {MEMBERS[kind] for kind in problem.integrated}
     for name in set(drawn) - {"gap_weights"}:
         assert abs(float(drawn[name].sum())) < 1e-9
     # Bayes: p(y) = p(y | w) p(w) / p(w | y), with the two latter from dense algebra.
-    linear = jax.jit(integrated.linear_part)(problem, values)
-    weights = members_of(problem, drawn)
-    design, prior, noise = dense(linear)
-    precision = np.linalg.inv(noise)
-    posterior = np.linalg.inv(design.T @ precision @ design + np.linalg.inv(prior))
-    mean = posterior @ design.T @ precision @ np.asarray(linear.residual)
+    linear = jax.jit(marginal.linear_part)(problem, values)
+    scores = scores_of(problem, values, drawn)
+    design = dense(linear)
+    posterior = np.linalg.inv(np.eye(design.shape[1]) + design.T @ design)
+    mean = posterior @ design.T @ np.asarray(linear.residual)
     own = slow_given_members(problem, case, values, drawn)
-    bayes = (
-        own
-        + stats.norm.logpdf(weights, 0.0, np.sqrt(np.diag(prior))).sum()
-        - log_normal(weights - mean, posterior)
-    )
+    bayes = own + stats.norm.logpdf(scores).sum() - log_normal(scores - mean, posterior)
     whole = float(log_likelihood(problem, values))
     assert whole == pytest.approx(bayes, rel=1e-7)
 
@@ -419,10 +406,10 @@ def test_the_law_of_a_leftover_is_that_of_its_draws(structured):
     values, count = random_values(0), 20_000
 
     def draw(key):
-        return integrated.draw_members(problem, values, key)["gap_weights"]
+        return marginal.draw_members(problem, values, key)["gap_weights"]
 
     drawn = jax.jit(jax.vmap(draw))(jax.random.split(jax.random.key(1), count))
-    mean, root = map(np.asarray, jax.jit(integrated.gap_law)(problem, values))
+    mean, root = map(np.asarray, jax.jit(marginal.gap_distribution)(problem, values))
     sd = np.linalg.norm(root, axis=1)
     assert np.all(np.abs(np.mean(drawn, axis=0) - mean) < 5.0 * sd / np.sqrt(count))
     off = np.cov(np.asarray(drawn).T) - root @ root.T
@@ -435,15 +422,17 @@ def log_normal(error, covariance):
     return stats.norm.logpdf(score).sum() - np.log(np.diag(root)).sum()
 
 
-def members_of(problem, drawn):
-    """Return the weights behind drawn members, in the order of the dense design."""
+def scores_of(problem, values, drawn):
+    """Return the scores behind drawn members, in the order of the dense design."""
     parts = [np.zeros(0)]
     for kind, count in (("run", problem.runs), ("specimen", problem.specimens)):
         if kind in problem.integrated:
-            parts.append(contrasts(count).T @ drawn[of_draw.MEMBERS[kind]])
+            member = drawn[MEMBERS[kind]] / values[MEMBER_SD[kind]]
+            parts.append(contrasts(count).T @ member)
     parts.sort(key=len, reverse=True)
     if "discrepancy" in problem.integrated:
-        parts.append(drawn["gap_weights"])
+        sd = problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
+        parts.append(drawn["gap_weights"] / np.asarray(sd))
     return np.concatenate(parts)
 
 
@@ -484,23 +473,20 @@ def test_too_many_members_are_refused(
 @pytest.mark.parametrize(
     ("linear", "counts", "order"),
     [
-        ({"run", "specimen"}, {"run": 600, "specimen": 600}, ("run", "specimen")),
-        ({"run", "discrepancy"}, {"run": 600, "specimen": 700}, ("run",)),
+        ({"run", "specimen"}, {"run": 600, "specimen": 60}, ("run", "specimen")),
+        ({"run", "discrepancy"}, {"run": 600, "specimen": 70}, ("run",)),
         (
             {"run", "specimen", "discrepancy"},
-            {"discrepancy": 2000, "run": 600, "specimen": 900},
+            {"discrepancy": 2000, "run": 60, "specimen": 900},
             ("specimen", "run", "discrepancy"),
         ),
     ],
 )
-def test_what_is_eliminated_is_decided_in_one_place(linear, counts, order):
-    integrated = integrated_kinds(counts, frozenset(linear))
-    assert integrated == order
-    with pytest.raises(InputError) as error:
-        check_member_counts("case", counts, integrated)
-    (found,) = error.value.findings
+def test_the_more_numerous_kind_is_eliminated(linear, counts, order):
+    assert integrated_kinds("case", counts, frozenset(linear)) == order
     other = ({"run", "specimen"} - {order[0]}).pop()
-    assert found.problem.startswith(f"{counts[other]} {other}s are too many")
+    with pytest.raises(InputError, match=f"600 {other}s are too many"):
+        integrated_kinds("case", counts | {other: 600}, frozenset(linear) - {other})
 
 
 def test_runs_by_the_thousand_are_integrated_out(loading, gear):
@@ -509,7 +495,7 @@ def test_runs_by_the_thousand_are_integrated_out(loading, gear):
     case = case_of(records, gear)
     problem = build_problem(case, SHIPPED, structure=form_of(case))
     values = random_values(3)
-    linear = jax.jit(integrated.linear_part)(problem, values)
+    linear = jax.jit(marginal.linear_part)(problem, values)
     # No array has an entry for each pair of runs.
     largest = max(leaf.size for leaf in jax.tree.leaves(linear))
     assert largest <= 2_000 * 15

@@ -6,11 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from readings import draw_reading
 from scipy import stats
 from scipy.special import logsumexp
 
 from hdcal.inference import likelihood
-from hdcal.inference.likelihood import draw_reading
 from hdcal.physics.effect import Noise
 
 log_probability = jax.jit(likelihood.log_probability, static_argnames="rounded")

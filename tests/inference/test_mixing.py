@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 from arviz_base import from_dict
 
-from hdcal.inference.diagnostics import power_sensitivity
-from hdcal.inference.mixing import have_mixed, mixing, pareto_shape
+from hdcal.inference.diagnostics import (
+    have_mixed,
+    mixing,
+    pareto_shape,
+    power_sensitivity,
+)
 
 
 def chains(shape: tuple[int, int] = (4, 1000)) -> np.ndarray:

@@ -11,15 +11,15 @@ from slices import slice_of
 from structures import form_of
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference import compress, density
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
-from hdcal.inference.integrated import draw_members
-from hdcal.inference.linearisation import linearise
+from hdcal.inference import compression, density
+from hdcal.inference.identifiability import linearise
+from hdcal.inference.marginal import draw_members
 from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.inference.values import predict_rows
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import build_dynamic, predict_motion
 from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.
@@ -175,7 +175,7 @@ def test_groups_of_no_rows_change_nothing():
 def test_groups_of_one_sd_are_not_padded():
     """Runs and specimens have parameters: another number is another executable."""
     problem = build_problem(case_of(runs=3, specimens=2), effect_priors())
-    assert isinstance(problem.blocks, compress.CompressedRows)
+    assert isinstance(problem.blocks, compression.CompressedRows)
     assert len(problem.blocks.count) == 6
 
 

@@ -15,9 +15,9 @@ from hdcal.calibration.calibration import summarise
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
 from hdcal.inference import model
+from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
-from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
 
@@ -49,7 +49,7 @@ def test_both_kinds_of_member_have_their_effect():
 @pytest.mark.parametrize("seen_sd", [0.01, 1.0, 100.0])
 def test_members_have_their_law_however_they_are_sampled(seen_sd: float):
     def members():
-        model._sample_members("run_offset", 2.0, seen_sd, 5)
+        model._sample_deviations("run_offset", 2.0, seen_sd, 5)
 
     drawn = Predictive(members, num_samples=20_000)(jax.random.key(0))["run_offset"]
     # Deviations from the mean of five.

@@ -47,8 +47,8 @@ def test_the_density_is_that_of_the_stated_priors(reading: str):
 
 @pytest.mark.thorough
 def test_a_coordinate_that_forgets_the_slack_is_told(monkeypatch):
-    def forgetful(law, scale, _):
-        return unmoved(law, scale, 0.0)
+    def forgetful(name, prior, scale, _):
+        return unmoved(name, prior, scale, 0.0)
 
     unmoved = model._scaled_and_moved
     monkeypatch.setattr(model, "_scaled_and_moved", forgetful)

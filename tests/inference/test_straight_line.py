@@ -35,6 +35,15 @@ def test_only_a_stiffness_that_is_far_off_fails():
     records = records_of(x, 200.0 * x + rng.normal(0.0, 0.5, 100))
     for middle, outcome in ((200.0, "passed"), (215.0, "passed"), (150.0, "failed")):
         draws = rng.normal(middle, 1.0, 1000)
-        assert line_check(records, draws).outcome == outcome
+        assert line_check(records, draws, sized=False).outcome == outcome
     # So wide an interval says that it does not know.
-    assert line_check(records, rng.normal(150.0, 40.0, 1000)).outcome == "passed"
+    wide = rng.normal(150.0, 40.0, 1000)
+    assert line_check(records, wide, sized=False).outcome == "passed"
+
+
+def test_a_stiffness_whose_sign_the_readings_do_not_tell_fails_without_sizes():
+    rng = np.random.default_rng(2)
+    records = records_of(np.linspace(0.0, 0.5, 20), rng.normal(0.0, 100.0, 20))
+    draws = np.abs(rng.normal(100.0, 80.0, 1000))
+    assert line_check(records, draws, sized=False).outcome == "failed"
+    assert line_check(records, draws, sized=True).outcome == "passed"

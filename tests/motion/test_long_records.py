@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from moving import TRUTH, motion, moving_case
 
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import build_dynamic
-from hdcal.inference.posterior_tree import TOTAL
+from hdcal.inference.assembly import TOTAL
 from hdcal.motion import bands, dynamic_calibration, frequency_scan
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import build_dynamic
 from hdcal.physics import linear_response as response
 
 

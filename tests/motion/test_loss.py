@@ -15,13 +15,13 @@ from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution, frozen
-from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_priors import FRICTION, dynamic_site_priors
-from hdcal.inference.dynamic_problem import build_dynamic
-from hdcal.inference.model_average import load_any
+from hdcal.inference.model_average import load_models
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.motion import loss
 from hdcal.motion.dynamic_calibration import highest_peak
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_priors import FRICTION, dynamic_site_priors
+from hdcal.motion.dynamic_problem import build_dynamic
 from hdcal.motion.summary import found_loss
 from hdcal.physics.effects.loops import CoulombFriction
 
@@ -267,7 +267,7 @@ def test_the_friction_is_sampled():
 
 def test_the_friction_is_kept_and_taken_along(posterior, tmp_path):
     posterior.save(tmp_path / "posterior.nc")
-    loaded = load_any(tmp_path)
+    loaded = load_models(tmp_path, [DynamicPosterior])
     assert [effect.name for effect in loaded.effects] == ["coulomb_friction"]
     assert np.array_equal(loaded.draws[FRICTION], posterior.draws[FRICTION])
     moved = respond(loaded, "step", amplitude=40.0, duration=0.02, points=51, draws=20)

@@ -15,14 +15,14 @@ from short import SHORT
 from hdcal import InputError, NotUsable, Prior, calibrate_dynamic, predict, respond
 from hdcal.__main__ import main
 from hdcal.inference.checks import Check
-from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import build_dynamic
-from hdcal.inference.model_average import load_any
+from hdcal.inference.model_average import load_models
 from hdcal.motion import dynamic_calibration as calibration
 from hdcal.motion.answer import DynamicCalibrationAnswer
 from hdcal.motion.bands import motion_bands
 from hdcal.motion.dynamic_calibration import highest_peak
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import build_dynamic
 from hdcal.motion.summary import dynamic_answer
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.report.plain import as_json
@@ -121,7 +121,7 @@ def test_the_same_seed_gives_the_same_draws_and_a_file_gives_them_back(
     again = calibrate_dynamic(moving_case(0), **SETTINGS)
     assert np.array_equal(again.draws["mass"], posterior.draws["mass"])
     posterior.save(tmp_path / "posterior.nc")
-    loaded = load_any(tmp_path)
+    loaded = load_models(tmp_path, [DynamicPosterior])
     assert isinstance(loaded, DynamicPosterior)
     assert np.array_equal(loaded.draws["mass"], posterior.draws["mass"])
     assert as_json(dynamic_answer(loaded)) == as_json(dynamic_answer(posterior))

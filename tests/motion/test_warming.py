@@ -7,10 +7,10 @@ from rigs import make_case, make_records
 from short import SHORT
 
 from hdcal import calibrate_dynamic
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import build_dynamic, predict_states
 from hdcal.motion import bands
 from hdcal.motion.bands import motion_bands
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import build_dynamic, predict_states
 from hdcal.physics import linear_response as response
 from hdcal.physics.linear_response import linear_response
 

@@ -11,11 +11,11 @@ import jax
 import numpy as np
 import pytest
 from posteriors import written_posterior
+from readings import draw_reading
 from rigs import draw_truth, make_case, make_records, posterior_draws
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.values import member_base
 from hdcal.physics.chain import predict_reading

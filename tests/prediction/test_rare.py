@@ -14,7 +14,7 @@ from slices import slice_of
 import hdcal
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior
-from hdcal.inference.mixing import pareto_shape
+from hdcal.inference.diagnostics import pareto_shape
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES

@@ -162,10 +162,11 @@ def test_the_longest_straight_part(curve, low, high):
     x = np.linspace(0.0, 1.0, 300)
     part = screen(x, curve(x) + RNG.normal(0.0, 0.02, 300)).straight
     assert not part.whole
-    assert (part.low, part.high) == (
-        pytest.approx(low, abs=0.02),
-        pytest.approx(high, abs=0.02),
-    )
+    # A tenth of it is left out where it meets another piece.
+    margin = 0.1 * (high - low)
+    low, high = low + margin * (low > 0.0), high - margin * (high < 1.0)
+    assert part.low == pytest.approx(low, abs=0.02)
+    assert part.high == pytest.approx(high, abs=0.02)
     assert part.slope == pytest.approx(20.0, rel=0.01)
 
 

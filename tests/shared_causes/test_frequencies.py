@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import gammaln, logsumexp
 
-from hdcal.inference.mixing import have_mixed
+from hdcal.inference.diagnostics import have_mixed
 from hdcal.shared_causes import frequencies
 from hdcal.shared_causes.frequencies import sample_frequencies
 

@@ -6,9 +6,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from readings import draw_reading
 
 from hdcal import EFFECTS
-from hdcal.inference.likelihood import draw_reading, log_probability
+from hdcal.inference.likelihood import log_probability
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, parameters
 

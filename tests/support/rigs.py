@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import jax
 import numpy as np
+from readings import draw_reading
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import (
@@ -15,7 +16,6 @@ from hdcal.data.priors import (
 from hdcal.data.records import Geometry, Records
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
-from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
 from hdcal.inference.serial_correlation import CORRELATION

@@ -6,27 +6,30 @@ from dataclasses import asdict, replace
 from difflib import get_close_matches
 
 import numpy as np
-import xarray as xr
 
 from hdcal.calibration.straight_part import straight_check
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
+from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference import laplace
-from hdcal.inference.assembly import Specifics, assemble, run_settings
+from hdcal.inference.assembly import (
+    Specifics,
+    assemble,
+    force_log_likelihood,
+    run_settings,
+)
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
-from hdcal.inference.flat_directions import remove_members
-from hdcal.inference.linearisation import linearise
+from hdcal.inference.identifiability import linearise
+from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.noise_form import noise_grows, pilot_fit
 from hdcal.inference.posterior import STRUCTURE, Posterior
-from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.straight_line import line_check
 from hdcal.inference.structure import ModelStructure, decide_structure
-from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.physics.effects.scatter import Scatter
@@ -186,9 +189,8 @@ def calibrate(
     found = sample(problem, fitted, seed, progress=progress, **size)
     # An effect, or a bend that was asked for, is a reason for another stiffness.
     plain = not asked and with_gap is None
-    own = _specifics(case, problem, form, found, plain=plain, shown=shown)
+    own = _specifics(case, theory, problem, form, found, plain=plain, shown=shown)
     parts = assemble(case, priors, problem, found, own, seed)
-    parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
     settings |= {STRUCTURE: asdict(form)} | run_settings(found, began)
     posterior = Posterior(case, theory, chosen, priors, *parts, settings)
@@ -219,6 +221,7 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
 
 def _specifics(
     case: Case,
+    theory: Theory,
     problem: Problem,
     form: ModelStructure,
     found: Draws,
@@ -230,20 +233,15 @@ def _specifics(
     centre = {
         name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
     }
-    near = linearise(problem, centre, case.records)
-    members = near.members / near.sd[:, None]
     sigma, rows = found.values["sigma"], len(case.records.force)
     line_checks = []
     if plain:
         stiffness = found.values["stiffness"]
-        line_checks += [line_check(case.records, stiffness)]
+        line_checks += [line_check(case.records, stiffness, sized=theory != SPRING)]
         line_checks += [straight_check(case, stiffness)]
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
-        slopes={
-            name: remove_members(slope / near.sd, members)
-            for name, slope in near.slopes.items()
-        },
+        sensitivities=linearise(problem, centre, case.records).sensitivities(),
         mixed=_other_quantities(problem, found),
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),

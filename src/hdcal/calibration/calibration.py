@@ -79,7 +79,7 @@ class Calibration(PosteriorResult):
         """Working range over which a curve that is no line has its stiffness."""
         found = self.posterior.case.screening
         part = None if found is None else found.straight
-        if found is None or part is None or part.whole or self.effects:
+        if found is None or part is None or part.whole or self.acting:
             return ""
         return found.working_range
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from hdcal.calibration.check.charts import left_out
 from hdcal.data.loading import movement_words
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
@@ -25,8 +26,11 @@ from hdcal.report.chart_spec import (
     Span,
     ascending_colours,
 )
+from hdcal.screening.result import DROPPED, OUTSIDE
 
 _MOST_COLUMNS, _MOST_GROUPS = 3, 6
+# What was left out and is part of the curve; a wild reading would flatten the picture.
+_PARTS_OF_CURVE = (DROPPED, OUTSIDE)
 # Marker of each direction, and its colour where colours show nothing else.
 _MARKERS = {1: ("^", INK), -1: ("v", GREY)}
 
@@ -46,7 +50,9 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
     nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
     distance = distance_from_model(bands, left)
     reach = _reach(bands, distance)
-    top, panels = [*band_marks(bands)], []
+    top, panels, found = [*band_marks(bands)], [], posterior.case.screening
+    if found is not None:
+        top += left_out(found, _PARTS_OF_CURVE)
     for index, (level, colour) in enumerate(zip(levels, colours, strict=True)):
         here = nearest == index
         points = "" if len(levels) == 1 else colour

@@ -78,10 +78,11 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
             not (dynamic or settings["effects"]) and settings.get("with_gap") is None
         )
         if plain and case is not None:
-            from hdcal.calibration.straight_part import straight_range
+            from hdcal.calibration.straight_part import takes_straight_part
+            from hdcal.screening.working_range import STRAIGHT
 
-            if wanted := straight_range(case):
-                case = read_given(console, data, **{**reading, "range": wanted})
+            if takes_straight_part(case):
+                case = read_given(console, data, **{**reading, "range": STRAIGHT})
         # Said now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"

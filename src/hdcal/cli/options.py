@@ -94,9 +94,9 @@ reading_options = combined(
     click.option(
         "--range",
         metavar="LOW:HIGH",
-        help="Working range: 0.1:0.6 of the deformation [mm], or 10%:40% of the "
-        "largest force, or all until the force drops for good [default: all; "
-        "calibrate takes the longest straight part of a curve that is no line].",
+        help="Working range: 0.1:0.6 of the deformation [mm], 10%:40% of the largest "
+        "force, straight for the longest straight part, or all until the force drops "
+        "for good [default: all; of calibrate straight, for a curve that is no line].",
     ),
     click.option(
         "--theory",

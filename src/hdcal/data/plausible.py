@@ -54,7 +54,7 @@ _SCATTER = "from nothing to as large as the largest force"
 _STEEL = "from the softest gel to ten times diamond"
 RANGES = {
     # readings
-    "deformation": Range(-1e3, 1e3, "mm", "no gear gives way by a metre"),
+    "deformation": Range(-1e5, 1e5, "mm", "no rig is two hundred metres long"),
     "force": Range(-1e9, 1e9, "N", "no rig presses with the weight of a large ship"),
     "temperature": Range(-273.15, 3e3, "°C", "absolute zero, and where steel boils"),
     "time": Range(-1e12, 1e12, "s", "thirty thousand years"),

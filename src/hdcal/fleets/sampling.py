@@ -1,4 +1,4 @@
-"""Draws of the population: by independent proposals, or by NUTS where these fail."""
+"""Draws of the population: by importance sampling, or by NUTS where these fail."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -9,8 +9,8 @@ from hdcal.data.prior import Prior
 from hdcal.fleets.population_problem import PopulationProblem
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, mixing_checks, sampling_checks
-from hdcal.inference.independence import MAX_SHAPE, sample_independently
-from hdcal.inference.mixing import mixing
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.importance import MAX_SHAPE, sample_by_importance
 from hdcal.inference.sample import Progress, sample
 
 
@@ -51,14 +51,14 @@ def sample_population(
     """
     whitening = laplace.fit(problem, start)
     size = {"chains": chains, "draws": draws, "progress": progress}
-    cheap = sample_independently(problem, whitening, seed, **size)
+    cheap = sample_by_importance(problem, whitening, seed, **size)
     if cheap is not None:
         mixed = mixing(_free(cheap.values, problem.priors))
         checks = (*mixing_checks(mixed, chains), _covering(cheap.shape))
-        return SampledPopulation(_flat(cheap.values), checks, "independent proposals")
+        return SampledPopulation(_flat(cheap.values), checks, "importance sampling")
     found = sample(problem, whitening, seed, warmup=warmup, **size)
     mixed = mixing(_free(found.values, problem.priors))
-    checks = sampling_checks(vars(found), mixed)
+    checks = sampling_checks(found, mixed)
     return SampledPopulation(_flat(found.values), checks, "NUTS")
 
 

@@ -1,15 +1,17 @@
-"""From draws to a posterior: what every kind of calibration does after sampling."""
+"""From draws to the groups, diagnoses and checks of a posterior."""
 
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import jax
 import numpy as np
 import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.versions import versions
+from hdcal.exported import jit
 from hdcal.inference.checks import (
     Check,
     bound_check,
@@ -17,32 +19,48 @@ from hdcal.inference.checks import (
     identification_checks,
     sampling_checks,
 )
-from hdcal.inference.density import densities
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
+from hdcal.inference.density import densities, pointwise_log_likelihood
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.flat_directions import dead_parameters, flat_directions
-from hdcal.inference.mixing import mixing
-from hdcal.inference.posterior_tree import build_tree
+from hdcal.inference.identifiability import unidentified
+from hdcal.inference.padding import pad_records
+from hdcal.inference.posterior_tree import data_groups, dataset
+from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import previous_rows
 
 _PRIOR_DRAWS = 2000
+# The log likelihood of every row and draw is not kept above this many numbers.
+MOST_LOG_LIKELIHOODS = 8_000_000
+TOTAL = "total"
+# Units of what follows from the parameters, and of what has no prior of its own.
+_UNITS = {
+    "stiffness": "N/mm",
+    "damping": "N*s/mm",
+    "natural_frequency": "Hz",
+    "run_offset": "N",
+    "specimen_deviation": "1",
+    "gap_weights": "N",
+}
 
 
 @dataclass(frozen=True)
 class Specifics:
-    """What one kind of calibration found out that another has no equal of.
+    """Results of one kind of calibration that `assemble` takes over.
 
     Attributes:
-        log_likelihood: by observed column, as `build_tree` takes it.
-        slopes: of the mean reading by parameter, in noise sds.
+        log_likelihood: by observed column, (chain, draw, row), or the total of all
+            rows under `TOTAL`, (chain, draw).
+        sensitivities: of the mean reading to each parameter, in noise sds.
         mixed: what else must have mixed, (chain, draw) each.
         checks: further ones.
         observed: columns of the records that the model explains.
     """
 
     log_likelihood: Mapping[str, np.ndarray]
-    slopes: Mapping[str, np.ndarray]
+    sensitivities: Mapping[str, np.ndarray]
     mixed: Mapping[str, np.ndarray]
     checks: Sequence[Check]
     observed: tuple[str, ...] = ("force",)
@@ -52,7 +70,7 @@ def assemble(
     case: Case,
     priors: Mapping[str, Prior],
     problem: Sampled,
-    found: Draws,
+    draws: Draws,
     own: Specifics,
     seed: int,
 ) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
@@ -62,51 +80,102 @@ def assemble(
         case: data and gear.
         priors: of every site.
         problem: what was sampled.
-        found: its draws.
+        draws: from the sampler.
         own: of this kind of calibration.
         seed: of the prior draws.
     """
-    weights = densities(problem, found.values)
-    centre = {name: np.median(v, axis=(0, 1)) for name, v in found.values.items()}
-    # From here on what is compared with the draws is what was believed of them.
+    values, weights = draws.values, densities(problem, draws.values)
+    centre = {name: np.median(v, axis=(0, 1)) for name, v in values.items()}
+    # Draws are compared with the priors given how the mountings differ.
     problem = replace(problem, priors=problem.priors_given(centre))
     sampled = {
         name: problem.priors[name]
         for name, prior in priors.items()
-        if name in found.values and prior.family != "fixed"
+        if name in values and prior.family != "fixed"
     }
-    scalars = {name: found.values[name] for name in sampled}
+    scalars = {name: values[name] for name in sampled}
     diagnoses = diagnose_parameters(scalars, sampled, *weights)
     rng = np.random.default_rng(seed)
     prior_draws = {
-        name: sample_prior(prior, name, rng, _PRIOR_DRAWS)
+        name: sample_prior(prior, name, rng, _PRIOR_DRAWS)[None]
         for name, prior in sampled.items()
     }
-    units = {name: prior.unit for name, prior in priors.items() if prior.unit}
-    about = units, own.log_likelihood, own.observed
-    tree = build_tree(case, found, prior_draws, *about)
-    dead = dead_parameters(own.slopes, problem)
-    alive = {name: slope for name, slope in own.slopes.items() if name not in dead}
+    units = _UNITS | {name: prior.unit for name, prior in priors.items() if prior.unit}
+    labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
+    groups = {
+        "posterior": dataset(values, units=units, labels=labels),
+        "prior": dataset(prior_draws, units=units),
+        "sample_stats": dataset(_statistics(draws)),
+        **data_groups(case.records, own.observed),
+        "log_likelihood": dataset(own.log_likelihood),
+    }
+    if TOTAL in own.log_likelihood:
+        groups["log_likelihood"][TOTAL].attrs["comment"] = (
+            "log likelihood of all rows, runs, specimens and gap integrated out where "
+            "they were; values by row are not kept for so many rows"
+        )
     checks = (
-        *sampling_checks(vars(found), diagnoses | mixing(own.mixed)),
+        *sampling_checks(draws, diagnoses | mixing(own.mixed)),
         *own.checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
-        *identification_checks(dead, flat_directions(alive, problem)),
+        *identification_checks(*unidentified(own.sensitivities, problem)),
     )
-    return tree, diagnoses, checks
+    return xr.DataTree.from_dict(groups), diagnoses, checks
 
 
-def run_settings(found: Draws, began: float) -> dict[str, object]:
-    """Return what the file says of a run beside what was asked for.
+def _statistics(draws: Draws) -> dict[str, np.ndarray]:
+    """Return the statistics of the sampler under ArviZ' names, (chain, draw) each."""
+    return {
+        "energy": draws.energy,
+        "lp": -draws.potential,
+        "diverging": draws.diverging,
+        "n_steps": draws.n_steps,
+        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
+        "acceptance_rate": draws.acceptance,
+        "step_size": draws.step_size,
+    }
+
+
+def force_log_likelihood(
+    case: Case, problem: Problem, draws: Draws
+) -> dict[str, np.ndarray]:
+    """Return the log likelihood of each row and draw, or the totals if they are many.
 
     Args:
-        found: its draws.
+        case: data and gear.
+        problem: what was sampled.
+        draws: from the sampler.
+    """
+    rows = len(case.records.force)
+    if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
+        return {TOTAL: densities(problem, draws.values)[1]}
+    padded = pad_records(case.records)
+    columns = discrepancy_columns(problem.discrepancy, padded)
+    before = np.full(len(padded.force), -1)
+    before[:rows] = previous_rows(case.records)
+    each = _pointwise(problem, draws.values, padded, columns, before)
+    return {"force": np.asarray(each)[..., :rows]}
+
+
+@jit
+def _pointwise(problem, values, records, columns, before):
+    def one(value):
+        return pointwise_log_likelihood(problem, value, records, columns, before)
+
+    return jax.vmap(jax.vmap(one))(values)
+
+
+def run_settings(draws: Draws, began: float) -> dict[str, object]:
+    """Return the settings that are known after a run.
+
+    Args:
+        draws: from the sampler.
         began: `time.perf_counter` at its beginning [s].
     """
     return {
-        "draws": found.energy.shape[1],
-        "target_acceptance": found.target_acceptance,
+        "draws": draws.energy.shape[1],
+        "target_acceptance": draws.target_acceptance,
         "versions": versions(),
         "seconds": round(time.perf_counter() - began, 3),
     }

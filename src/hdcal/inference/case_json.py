@@ -19,13 +19,6 @@ _ABOUT = (
     *("name", "run_labels", "specimen_labels", "data_sha256", "notes"),
     "excluded",
 )
-_TABLES = (
-    "priors",
-    "scale_priors",
-    "effect_priors",
-    "dynamic_priors",
-    "gauge_priors",
-)
 
 
 def to_json(plain: Any) -> str:
@@ -64,7 +57,7 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     """
     held = json.loads(text)
     gear = held["gear"]
-    for table in _TABLES:
+    for table in (name for name in gear if name.endswith("priors")):
         gear[table] = restore_priors(gear[table])
     sizes = gear["geometry"].items()
     gear["geometry"] = Geometry(**{n: nan if v is None else v for n, v in sizes})

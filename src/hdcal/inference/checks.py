@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 
 from hdcal.data.priors import Prior
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import frozen
-from hdcal.inference.mixing import ESS_PER_CHAIN, MAX_RHAT, Mixing
-from hdcal.inference.sample import MAX_TREE_DEPTH
+from hdcal.inference.sample import MAX_TREE_DEPTH, Draws
 from hdcal.inference.serial_correlation import CORRELATION, worth
 
 INDEPENDENT = "neighbouring readings err independently"
@@ -28,10 +28,11 @@ COARSEST_STEP = 1.5
 CONFLICT_TAIL = 0.0027
 # Nothing of these is an ordinary answer, not a bound that is in the way.
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
-# Correlation above which, with 95 % probability, it is told [-].
-_TOLD_CORRELATION = 0.1
-# Of such readings, worth fewer than so many independent ones, intervals are too narrow:
-# the prior expects less (tests/inference/test_correlation_prior.py).
+# Correlation that is reported where it is larger with 95 % probability [-].
+_REPORTED_CORRELATION = 0.1
+# Of readings with so strong a correlation that are worth fewer than so many independent
+# ones intervals are too narrow: the prior expects less
+# (tests/inference/test_correlation_prior.py).
 _STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 26.0
 
 
@@ -50,20 +51,22 @@ class Check:
     words: str
 
 
-def sampling_checks(
-    stats: Mapping[str, np.ndarray], mixed: Mapping[str, Mixing]
-) -> tuple[Check, ...]:
+def sampling_checks(draws: Draws, mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
     """Return the checks on the sampler: any of them failed fails the result.
 
     Args:
-        stats: energy, diverging, n_steps, each (chain, draw).
+        draws: from the sampler.
         mixed: by quantity.
     """
-    energy = _explored(stats["energy"])
-    divergent = int(stats["diverging"].sum())
-    saturated = float((stats["n_steps"] >= 2**MAX_TREE_DEPTH - 1).mean())
+    from arviz_stats.base.array import array_stats
+
+    # NaN, which no check passes, where the energy stands still.
+    with np.errstate(all="ignore"):
+        energy = np.asarray(array_stats.bfmi(draws.energy))
+    divergent = int(draws.diverging.sum())
+    saturated = float((draws.n_steps >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
-        *mixing_checks(mixed, len(stats["energy"])),
+        *mixing_checks(mixed, len(draws.energy)),
         _check(
             "energy is explored (BFMI)",
             bool(np.all(energy >= MIN_BFMI)),
@@ -72,7 +75,7 @@ def sampling_checks(
         _check(
             "no divergent trajectories",
             divergent == 0,
-            f"{divergent} of {stats['diverging'].size} draws diverged, allowed 0",
+            f"{divergent} of {draws.diverging.size} draws diverged, allowed 0",
         ),
         _check(
             "trajectories end by themselves (tree depth)",
@@ -84,49 +87,33 @@ def sampling_checks(
 
 
 def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]:
-    """Return the checks on chains, however they move.
+    """Return the checks on chains of any sampler.
 
     Args:
         mixed: by quantity.
         chains: how many.
     """
-    worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
-    least = min(
-        mixed,
-        key=lambda name: _least(mixed[name]),
-    )
-    top, need = mixed[worst].rhat, ESS_PER_CHAIN * chains
-    low = _least(mixed[least])
+    # Constant or infinite draws give NaN, which counts as the worst.
+    rhat = {n: np.nan_to_num(one.rhat, nan=np.inf) for n, one in mixed.items()}
+    size = {
+        n: min(np.nan_to_num([one.ess_bulk, one.ess_tail])) for n, one in mixed.items()
+    }
+    worst, least = max(rhat, key=rhat.__getitem__), min(size, key=size.__getitem__)
+    need = ESS_PER_CHAIN * chains
     return (
         _check(
             "chains agree (R-hat)",
-            top <= MAX_RHAT,
-            f"the largest R-hat is {top:.4f} ({worst}), allowed {MAX_RHAT}",
+            rhat[worst] <= MAX_RHAT,
+            f"the largest R-hat is {mixed[worst].rhat:.4f} ({worst}), allowed "
+            f"{MAX_RHAT}",
         ),
         _check(
             "enough effective draws (bulk and tail ESS)",
-            low >= need,
-            f"the smallest effective sample size is {low:.0f} ({least}), needed {need}",
+            size[least] >= need,
+            f"the smallest effective sample size is {size[least]:.0f} ({least}), "
+            f"needed {need}",
         ),
     )
-
-
-def _explored(energy: np.ndarray) -> np.ndarray:
-    """Return the BFMI of each chain; NaN where the energy stands still."""
-    from arviz_stats.base.array import array_stats
-
-    with np.errstate(all="ignore"):
-        return np.asarray(array_stats.bfmi(energy))
-
-
-def _bad(value: float) -> float:
-    # Constant or infinite draws give NaN, which must count as the worst.
-    return np.inf if np.isnan(value) else value
-
-
-def _least(mixed: Mixing) -> float:
-    sizes = (mixed.ess_bulk, mixed.ess_tail)
-    return 0.0 if np.isnan(sizes).any() else min(sizes)
 
 
 def _check(name: str, passed: bool, words: str) -> Check:
@@ -136,7 +123,7 @@ def _check(name: str, passed: bool, words: str) -> Check:
 def correlation_check(
     draws: Mapping[str, np.ndarray], rows: int, reason: str = ""
 ) -> Check:
-    """Say that neighbouring readings err alike, or that nobody looked.
+    """Report the correlation of neighbouring readings, or why none is in the model.
 
     Args:
         draws: by parameter.
@@ -147,7 +134,7 @@ def correlation_check(
         words = f"a correlation of neighbours is not inferred for these data: {reason}"
         return Check(INDEPENDENT, "note", words)
     least, *ends, middle = np.quantile(draws[CORRELATION], [0.05, 0.025, 0.975, 0.5])
-    if least < _TOLD_CORRELATION:
+    if least < _REPORTED_CORRELATION:
         return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
     span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
@@ -164,11 +151,11 @@ def correlation_check(
 
 
 def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
-    """Say that the noise was let grow with the force.
+    """Report noise that grows with the force.
 
     Args:
         draws: by parameter.
-        unasked: because the readings showed it.
+        unasked: whether it is in the model because the readings show it.
     """
     name = "readings scatter alike at any force"
     share = draws.get("heteroscedastic_noise.share")
@@ -178,8 +165,8 @@ def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> C
         f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
     )
     words += "; every interval allows for it"
-    remedy = "--constant-noise, or adapt_noise=False, keeps it of one size"
-    words += f". {remedy}" * unasked
+    if unasked:
+        words += ". --constant-noise, or adapt_noise=False, keeps it of one size"
     return Check(name, "note", words)
 
 
@@ -204,7 +191,7 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
 def conflict_check(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> Check:
-    """Say which posteriors lie where their prior thought nothing would be."""
+    """Warn of posteriors that lie far out in the tails of their priors."""
     far = {}
     for parameter, values in draws.items():
         prior, median = frozen(priors[parameter], parameter), float(np.median(values))
@@ -241,7 +228,7 @@ def _peaks_at_zero(prior: Prior) -> bool:
 
 
 def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) -> Check:
-    """Say which posteriors are pressed against an end of their prior."""
+    """Warn of posteriors that are pressed against an end of their prior."""
     name = "no parameter at a bound"
     piled = []
     for parameter, values in draws.items():
@@ -271,15 +258,22 @@ def listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
-def identification_checks(dead: list[str], flat: list[str]) -> tuple[Check, ...]:
-    """Report dead parameters and flat directions; the prior answers for both."""
+def identification_checks(
+    without_effect: list[str], flat: list[str]
+) -> tuple[Check, ...]:
+    """Report parameters and directions that the prior decides.
+
+    Args:
+        without_effect: names of parameters that the data do not depend on.
+        flat: a sentence for each flat direction.
+    """
     seen, apart = "every parameter is seen by the data", "parameters can be told apart"
-    words = [
-        f"{name}: these data say nothing, the prior is the answer" for name in dead
+    checks = [
+        Check(seen, "note", f"{name}: these data say nothing, the prior is the answer")
+        for name in without_effect
     ]
-    checks = [Check(seen, "note", sentence) for sentence in words]
     checks += [Check(apart, "note", sentence) for sentence in flat]
-    if not dead:
+    if not without_effect:
         checks.append(Check(seen, "passed", "each one moves the predicted readings"))
     if not flat:
         checks.append(Check(apart, "passed", "no direction is left to the priors"))

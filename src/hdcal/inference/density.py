@@ -9,17 +9,15 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference import compress
 from hdcal.inference.distributions import distribution
-from hdcal.inference.integrated import linear_part
 from hdcal.inference.likelihood import log_probability
+from hdcal.inference.marginal import linear_part
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import given_before
 from hdcal.inference.values import (
     Values,
-    block_coefficients,
     correlation_of,
     predict_rows,
     with_rounding,
@@ -32,7 +30,7 @@ def pointwise_log_likelihood(
 ) -> Float[Array, " n"]:
     """Return the log likelihood of each row given all values [log 1/N].
 
-    And given the rows before it in its run, where neighbours may err alike.
+    And given the rows before it in its run, where neighbours may be correlated.
 
     Args:
         problem: structure.
@@ -64,14 +62,8 @@ def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
 
 @log_likelihood.register
 def _(problem: Problem, values: Values) -> Float[Array, ""]:
-    if problem.integrated:
+    if problem.integrated or problem.blocks is not None:
         return linear_part(problem, values).log_likelihood()
-    if problem.blocks is not None:
-        correlation = correlation_of(values)
-        noise = values["sigma"], problem.step
-        blocks = problem.blocks.whitened(correlation, *noise)
-        coefficients = block_coefficients(problem, blocks, values)
-        return compress.log_likelihood(blocks, coefficients, *noise, correlation)
     rows = problem.rows, problem.columns, problem.before
     each = pointwise_log_likelihood(problem, values, *rows)
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
@@ -82,8 +74,7 @@ def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
     total = jnp.zeros(())
     for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":
-            law = distribution(prior, name)
-            total = total + law.log_prob(values[name])
+            total = total + distribution(prior, name).log_prob(values[name])
     return total
 
 

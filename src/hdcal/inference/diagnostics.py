@@ -1,7 +1,7 @@
-"""Whether the data or the priors decide each parameter, and how well it was sampled."""
+"""How well each parameter was sampled, and whether data or prior decide it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
@@ -9,19 +9,35 @@ from scipy.special import softmax
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import moments
-from hdcal.inference.mixing import Mixing, mixing
 
+# Limits of chains that have mixed: the largest R-hat, the smallest ESS of each chain.
+MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
+# Probability of ArviZ' default interval, for the ends of which the tail ESS is.
+_TAIL = 0.89
 # Share of the prior variance that the data must remove to decide a parameter; the
 # second value where power-scaling finds the likelihood weak.
 MIN_CONTRACTION, CLEAR_CONTRACTION = 0.75, 0.95
-# Power-scaling sensitivity from which a prior or a likelihood matters.
-SENSITIVE = 0.05
-# Change of the power, up and down.
-_POWER = 0.01
+# Power-scaling sensitivity from which a prior or a likelihood matters, and the change
+# of the power, up and down.
+SENSITIVE, _POWER = 0.05, 0.01
 
 Driver = Literal["data", "prior"]
-# The smallest number that has a logarithm.
-_TINY = np.finfo(float).tiny
+_SMALLEST = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class Mixing:
+    """Convergence of the chains in one quantity.
+
+    Attributes:
+        rhat: rank-normalised split R-hat; NaN where all draws are equal.
+        ess_bulk: effective sample size of the centre.
+        ess_tail: effective sample size of the ends of the interval.
+    """
+
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
 
 
 @dataclass(frozen=True)
@@ -41,6 +57,52 @@ class Diagnosis(Mixing):
     driven_by: Driver
 
 
+def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
+    """Return the convergence of each quantity, (chain, draw) each."""
+    return {name: _mixing(np.asarray(values, float)) for name, values in draws.items()}
+
+
+def _mixing(values: np.ndarray) -> Mixing:
+    # Importing arviz-stats takes a second.
+    from arviz_stats.base.array import array_stats
+
+    with np.errstate(all="ignore"):
+        numbers = (
+            array_stats.rhat(values),
+            array_stats.ess(values),
+            array_stats.ess(values, method="tail", prob=_TAIL),
+        )
+    return Mixing(*(np.asarray(number).item() for number in numbers))
+
+
+def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
+    """Return whether the chains of every quantity have mixed, (chain, draw) each."""
+    # Comparisons with NaN, the R-hat of equal draws, are false.
+    return all(
+        one.rhat <= MAX_RHAT
+        and min(one.ess_bulk, one.ess_tail) >= ESS_PER_CHAIN * len(draws[name])
+        for name, one in mixing(draws).items()
+    )
+
+
+def pareto_shape(weight: np.ndarray) -> float:
+    """Return the Pareto k of importance weights; infinite if few are above zero.
+
+    Args:
+        weight: of independent draws, up to a factor, shape (n,).
+
+    Raises:
+        ValueError: the largest weights are equal.
+    """
+    from arviz_stats.base.array import array_stats
+
+    # The tail that is fitted would hold weights of zero.
+    if np.count_nonzero(weight) <= 3.0 * np.sqrt(len(weight)):
+        return np.inf
+    shape = array_stats.pareto_khat(weight[None], r_eff=1.0, tail="right")
+    return np.asarray(shape).item()
+
+
 def diagnose_parameters(
     draws: Mapping[str, np.ndarray],
     priors: Mapping[str, Prior],
@@ -57,21 +119,19 @@ def diagnose_parameters(
     """
     to_prior = power_sensitivity(draws, log_prior)
     to_data = power_sensitivity(draws, log_likelihood)
-    found = {}
+    diagnoses = {}
     for name, mixed in mixing(draws).items():
         contraction = _contraction(draws[name], priors[name], name)
         weak = to_data[name] < SENSITIVE < to_prior[name]
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
-        found[name] = Diagnosis(
-            rhat=mixed.rhat,
-            ess_bulk=mixed.ess_bulk,
-            ess_tail=mixed.ess_tail,
+        diagnoses[name] = Diagnosis(
+            **asdict(mixed),
             contraction=contraction,
             prior_sensitivity=to_prior[name],
             likelihood_sensitivity=to_data[name],
             driven_by="data" if contraction >= enough else "prior",
         )
-    return found
+    return diagnoses
 
 
 def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
@@ -81,7 +141,7 @@ def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
     everywhere.
     """
     if prior.family == "lognormal":
-        logarithm, sd = np.log(np.maximum(draws, _TINY)), float(prior.numbers[1])
+        logarithm, sd = np.log(np.maximum(draws, _SMALLEST)), float(prior.numbers[1])
         return float(1.0 - logarithm.var() / sd**2)
     return float(1.0 - draws.var() / moments(prior, name)[1] ** 2)
 
@@ -99,7 +159,7 @@ def power_sensitivity(
     """
     from arviz_stats.base.array import array_stats
 
-    about = {
+    weights = {
         "lower_w": softmax(-_POWER * log_part),
         "upper_w": softmax(_POWER * log_part),
         "lower_alpha": 1.0 - _POWER,
@@ -108,6 +168,6 @@ def power_sensitivity(
     # The distance is 0/0 where all draws are equal.
     with np.errstate(all="ignore"):
         return {
-            name: np.asarray(array_stats.power_scale_sense(values, **about)).item()
+            name: np.asarray(array_stats.power_scale_sense(values, **weights)).item()
             for name, values in draws.items()
         }

@@ -4,10 +4,11 @@ A Gaussian process in the Hilbert-space approximation. Its basis is projected of
 an offset and a slope at the tested rows, so that it cannot take anything that
 stiffness and offsets can explain. Where loading and unloading were tested, half their
 difference is another such function, unless an effect of the model draws loops itself.
-It knows no temperature.
+It does not depend on temperature.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -16,7 +17,7 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference.padding import bucket_size, repeat_last_row
+from hdcal.inference.padding import pad_records
 from hdcal.physics.effect import Effect
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
@@ -25,9 +26,7 @@ BASIS_SIZE = 20
 # The first of them are enough for half a loop, which is smooth between its turns.
 _LOOP_SIZE = 8
 BOUNDARY = 2.0
-
-
-# What an effect needs whose force goes with the direction of the movement.
+# Covariates that an effect needs whose force depends on the direction of movement.
 _DIRECTION = {"unloading", "rates"}
 
 
@@ -39,7 +38,7 @@ class Discrepancy(eqx.Module):
         half_range: half the tested range [mm].
         absorbed: offset and slope in each function, the half loop's last.
         directed: whether there are functions for half a loop.
-        loop: what they are multiplied by: 0 where an effect draws loops itself.
+        loop: factor of the half loop: 0 where an effect draws loops itself.
     """
 
     centre: float
@@ -68,21 +67,30 @@ class Discrepancy(eqx.Module):
             movement: +1 where it rises, −1 where it falls, 0 for the mean of both.
         """
         scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
-        found = _functions(scaled, jnp.asarray(movement), directed=self.directed)
+        line = jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
+        functions = smooth = _basis(scaled)
+        if self.directed:
+            half = jnp.concatenate([line, smooth[:, :_LOOP_SIZE]], axis=1)
+            half = jnp.asarray(movement)[:, None] * half
+            functions = jnp.concatenate([smooth, half], axis=1)
         # Multiplied last, so that nothing of an unused loop is left.
         used = jnp.where(jnp.arange(self.size) < BASIS_SIZE, 1.0, self.loop)
-        return used * (found - _line(scaled) @ self.absorbed)
+        return used * (functions - line @ self.absorbed)
 
     def prior_sd(self, sd, length) -> Float[Array, " m"]:
-        """Return the prior sd of the weights [N], as `prior_sd` those of one basis.
+        """Return the prior sd of the weights [N].
 
-        Half a loop has an offset and a slope beside the smooth functions, of the size
+        Half a loop has an offset and a slope besides the smooth functions, of the size
         of the discrepancy each.
+
+        Args:
+            sd: of the discrepancy [N].
+            length: length-scale as a share of the tested range [-].
         """
-        own = prior_sd(sd, length)
+        smooth = prior_sd(sd, length)
         if not self.directed:
-            return own
-        return jnp.concatenate([own, jnp.full(2, sd), own[:_LOOP_SIZE]])
+            return smooth
+        return jnp.concatenate([smooth, jnp.full(2, sd), smooth[:_LOOP_SIZE]])
 
 
 def leftover_size(records: Records) -> int:
@@ -94,28 +102,6 @@ def leftover_size(records: Records) -> int:
     return BASIS_SIZE + (2 + _LOOP_SIZE) * ("unloading" in records.known)
 
 
-@jit(static_argnames=("directed",))
-def _functions(scaled, movement, *, directed: bool):
-    """Return the functions before anything is projected off, shape (n, m)."""
-    smooth = _basis(scaled)
-    if not directed:
-        return smooth
-    half = jnp.concatenate([_line(scaled), smooth[:, :_LOOP_SIZE]], axis=1)
-    return jnp.concatenate([smooth, movement[:, None] * half], axis=1)
-
-
-def _basis(scaled):
-    from numpyro.contrib.hsgp.laplacian import eigenfunctions
-
-    # Beyond the interval the eigenfunctions would repeat; hold them at its end.
-    return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
-
-
-@jit
-def _line(scaled):
-    return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
-
-
 def build_discrepancy(
     records: Records, effects: Sequence[type[Effect]] = ()
 ) -> Discrepancy:
@@ -123,24 +109,20 @@ def build_discrepancy(
 
     Args:
         records: tested rows.
-        effects: of the model; beside one whose force goes with the direction of the
-            movement half a loop would be a second name for the same thing.
+        effects: of the model; where the force of one depends on the direction of the
+            movement, half a loop is left out, which could not be distinguished from it.
     """
-    deformation, rows = np.asarray(records.deformation), len(records.deformation)
+    deformation = np.asarray(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))
     centre, half_range = (low + high) / 2.0, (high - low) / 2.0
-    place, movement = (
-        repeat_last_row(np.asarray(column), bucket_size(rows))
-        for column in ((deformation - centre) / half_range, records.sense)
-    )
-    directed = "unloading" in records.known
-    line, found = (
-        np.asarray(table)[:rows]
-        for table in (_line(place), _functions(place, movement, directed=directed))
-    )
-    absorbed = np.linalg.lstsq(line, found, rcond=None)[0]
+    nothing = np.zeros((2, leftover_size(records)))
+    raw = Discrepancy(centre, half_range, nothing, "unloading" in records.known)
+    functions = np.asarray(discrepancy_columns(raw, pad_records(records)))
+    scaled = (deformation - centre) / half_range
+    line = np.column_stack([np.ones_like(scaled), scaled])
+    absorbed = np.linalg.lstsq(line, functions[: len(line)], rcond=None)[0]
     taken = any(effect.needs & _DIRECTION for effect in effects)
-    return Discrepancy(centre, half_range, absorbed, directed, 0.0 if taken else 1.0)
+    return replace(raw, absorbed=absorbed, loop=0.0 if taken else 1.0)
 
 
 def discrepancy_columns(
@@ -162,13 +144,15 @@ def _columns(discrepancy: Discrepancy, deformation, movement):
     return discrepancy.columns(deformation, movement)
 
 
-def prior_sd(sd, length) -> Float[Array, " m"]:
-    """Return the prior sd of the weights of one basis [N].
+def _basis(scaled):
+    from numpyro.contrib.hsgp.laplacian import eigenfunctions
 
-    Args:
-        sd: of the discrepancy [N].
-        length: length-scale as a share of the tested range [-].
-    """
+    # Beyond the interval the eigenfunctions would repeat; hold them at its end.
+    return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
+
+
+def prior_sd(sd, length) -> Float[Array, " m"]:
+    """Return the prior sd of the weights of the smooth functions [N]; see above."""
     from numpyro.contrib.hsgp.spectral_densities import (
         diag_spectral_density_squared_exponential,
     )

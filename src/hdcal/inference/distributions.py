@@ -83,8 +83,8 @@ def moments(prior: Prior, name: str = "") -> tuple[float, float]:
     """
     if prior.family == "fixed":
         return float(prior.numbers[0]), 0.0
-    law: Any = frozen(prior, name)
-    return float(law.mean()), float(law.std())
+    scipy_prior: Any = frozen(prior, name)
+    return float(scipy_prior.mean()), float(scipy_prior.std())
 
 
 def sample_prior(

@@ -3,8 +3,8 @@
     F_read = (1 + g) F + b,   ω_read = (1 + h) ω,   T_read = T + θ,
 
 with ω₀ in the reading of the deformation. The likelihood, the loss of modulus with
-temperature α, effects and leftover are in terms of what was read, where the data tell
-of them; E₀, K and the stiffness are true. What no certificate states is not there.
+temperature α, effects and leftover are in terms of what was read; E₀, K and the
+stiffness are true. What no certificate states is left out.
 """
 
 from collections.abc import Mapping

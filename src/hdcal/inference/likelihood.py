@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import erfc as jax_erfc
 from jax.scipy.special import logsumexp
-from jaxtyping import Float, Key
+from jaxtyping import Float
 from scipy import special
 
 from hdcal.data.records import Array
@@ -19,7 +19,7 @@ _FAR = -20.0
 def log_interval(low, high):
     """Return log(Φ(high) − Φ(low)) without cancellation in either tail.
 
-    In NumPy of NumPy's arrays, whose shapes may be of any kind: nothing is compiled.
+    By NumPy for NumPy's arrays, whose shapes are many: nothing is compiled.
     """
     xp, erfc = (np, special.erfc) if isinstance(low, np.ndarray) else (jnp, jax_erfc)
     flip = low > 0.0
@@ -74,18 +74,3 @@ def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]
     log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
     share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
     return jnp.sum(share / noise.sd**2, axis=0)
-
-
-def draw_reading(
-    key: Key[Array, ""],
-    mean: Float[Array, " n"],
-    noise: Noise,
-    step: float | Float[Array, ""] = 0.0,
-) -> Float[Array, " n"]:
-    """Draw a reading of each row, rounded to `step` when it is positive [N]."""
-    pick, normal = jax.random.split(key)
-    component = jax.random.categorical(pick, noise.log_weight, shape=mean.shape)
-    sd = jnp.take_along_axis(noise.sd, component[None], axis=0)[0]
-    reading = mean + sd * jax.random.normal(normal, mean.shape)
-    unit = jnp.where(step > 0.0, step, 1.0)
-    return jnp.where(step > 0.0, unit * jnp.round(reading / unit), reading)

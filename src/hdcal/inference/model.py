@@ -1,8 +1,7 @@
 """The NumPyro model: the force model with any set of effects.
 
-The stiffness as read identifies K·E₀ times the gauges' gains only, so that product is
-sampled, given the rest, under exactly the prior that all imply; K follows. Sites whose
-names begin with "_" are coordinates of the sampler, not results.
+Sites whose names begin with "_" are coordinates of the sampler, not results. In each
+of them the stated prior is exact.
 """
 
 from collections.abc import Mapping
@@ -25,22 +24,64 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
 
 CONTACT = "deformation_offset"
+SLACK = "seating_slack.clearance"
+
+
+def declare(problem: Problem) -> None:
+    """Declare the joint density of parameters and data of the force model."""
+    priors, values = problem.priors, sample_stiffness(problem.priors)
+    values["alpha"] = sample_site("alpha", priors["alpha"])
+    values["force_offset"] = _sample_zero(problem, values)
+    with_slack = SLACK in priors
+    if not with_slack:
+        values[CONTACT] = sample_site(CONTACT, priors[CONTACT])
+    _sample_noise(problem, values)
+    for effect in problem.effects:
+        if effect.stage != "noise":
+            _sample_effect(problem, effect, values)
+    if with_slack:
+        values[CONTACT] = _sample_contact(problem, values)
+    _sample_members(problem, values)
+    numpyro.deterministic("stiffness", stiffness(problem, values))
+    numpyro.factor("force", log_likelihood(problem, values))
 
 
 def sample_site(name: str, prior: Prior):
-    """Sample a parameter from its prior; a fixed one is what it is."""
+    """Sample a parameter from its prior; a fixed one is a constant."""
     if prior.family == "fixed":
         return numpyro.deterministic(name, jnp.asarray(prior.numbers[0]))
     return numpyro.sample(name, distribution(prior, name))
+
+
+def sample_moved(
+    name: str,
+    prior: Prior,
+    coordinate: str,
+    scale: Scalar = 1.0,
+    shift: Scalar = 0.0,
+):
+    """Sample scale · parameter + shift as a coordinate, and return the parameter."""
+    if prior.family == "fixed":
+        return sample_site(name, prior)
+    moved = numpyro.sample(coordinate, _scaled_and_moved(name, prior, scale, shift))
+    return numpyro.deterministic(name, (moved - shift) / scale)
+
+
+def _scaled_and_moved(name: str, prior: Prior, scale, shift) -> dist.Distribution:
+    """Return the distribution of scale · parameter + shift."""
+    base = distribution(prior, name)
+    domain = base.support or dist.constraints.real
+    transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
+    return dist.TransformedDistribution(base, transform)
 
 
 def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
     """Sample a parameter of an effect.
 
     A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
-    resolve: linear where they see it, and a logarithm only below that. A plain
-    logarithm stretches the neighbourhood of zero, where an absent effect has its
-    posterior. The logistic density of u is taken off again, so the prior is exact.
+    resolve: linear where they do, and a logarithm only below that. A plain logarithm
+    stretches the neighbourhood of zero, where an absent effect has its posterior. The
+    logistic density of u is divided out.
 
     Args:
         name: of the parameter.
@@ -59,80 +100,57 @@ def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
 
 
 def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
-    """Sample E₀, what certificates state of the gauges, and K."""
-    values = {"E0": sample_site("E0", priors["E0"])}
-    stated = (name for name in GAUGE_UNITS if name in priors)
-    values |= {name: sample_site(name, priors[name]) for name in stated}
-    values["K"] = _sample_influence(priors["K"], with_gains(values, values["E0"]))
+    """Sample E₀, what certificates state of the gauges, and K.
+
+    The readings identify K·E₀ times the gauges' gains only, so that product is the
+    coordinate.
+    """
+    names = ["E0", *(name for name in GAUGE_UNITS if name in priors)]
+    values = {name: sample_site(name, priors[name]) for name in names}
+    modulus = with_gains(values, values["E0"])
+    values["K"] = sample_moved("K", priors["K"], "_KE0", modulus)
     return values
 
 
-def _sample_influence(prior: Prior, modulus):
-    """Sample K·E₀, as read, under the prior of K, and return K."""
-    if prior.family == "fixed":
-        return sample_site("K", prior)
-    law = _scaled_and_moved(distribution(prior), modulus, 0.0)
-    product = numpyro.sample("_KE0", law)
-    return numpyro.deterministic("K", product / modulus)
+def _sample_zero(problem: Problem, values: Mapping):
+    """Sample the zero of the force, by the force at the centre of distant readings.
 
-
-def _scaled_and_moved(law, scale, shift) -> dist.Distribution:
-    """Return the distribution of scale · parameter + shift."""
-    domain = law.support or dist.constraints.real
-    transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
-    return dist.TransformedDistribution(law, transform)
+    Along the ridge of zero and stiffness the force at the centre stays. The ridge is
+    straight in it, and curved in the zero and the logarithm of the stiffness.
+    """
+    name, prior = "force_offset", problem.priors["force_offset"]
+    if not problem.far:
+        return sample_site(name, prior)
+    there = stiffness(problem, values) * problem.centre
+    return sample_moved(name, prior, "_centre_force", shift=there)
 
 
 def _sample_contact(problem: Problem, values: Mapping):
-    """Sample the point of first contact ω₀ beside slack: where that is taken up.
+    """Sample the point of first contact ω₀ with slack c, by where slack is taken up.
 
-    Rows of a gear that is pressed show ω₀ + c well, and neither ω₀ nor the slack c. The
+    Rows of a gear that is pressed show ω₀ + c well, and neither ω₀ nor c. The
     coordinate of c is curved, and so would be the narrow ridge along which they trade.
     A gear that is both pressed and pulled shows ω₀ itself.
     """
-    prior = problem.priors[CONTACT]
-    if prior.family == "fixed":
-        return sample_site(CONTACT, prior)
     pressed = jnp.mean(jnp.sign(problem.rows.deformation))
-    slack = values["seating_slack.clearance"]
-    taken = pressed * slack / problem.reading.radial_per_read
-    law = _scaled_and_moved(distribution(prior), 1.0, taken)
-    corner = numpyro.sample("_corner", law)
-    return numpyro.deterministic(CONTACT, corner - taken)
-
-
-def _sample_zero(problem: Problem, values: Mapping):
-    """Sample the force at the centre of readings far from the origin, and its zero.
-
-    Along the ridge of zero and stiffness the force at the centre stays. The ridge is
-    straight in it, and curved in the zero beside a logarithm of the stiffness.
-    """
-    prior = problem.priors["force_offset"]
-    if prior.family == "fixed":
-        return sample_site("force_offset", prior)
-    there = stiffness(problem, values) * problem.centre
-    law = _scaled_and_moved(distribution(prior), 1.0, there)
-    at_centre = numpyro.sample("_centre_force", law)
-    return numpyro.deterministic("force_offset", at_centre - there)
+    taken_up = pressed * values[SLACK] / problem.reading.radial_per_read
+    return sample_moved(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)
 
 
 def _sample_noise(problem: Problem, values: dict) -> None:
-    """Sample what noise there is: its sd, how neighbours err alike, and its growth.
+    """Sample the noise: its sd, the correlation of neighbours, and its growth.
 
-    Where neighbours err nearly alike rows show what each adds to the one before,
-    σ √(1 − ρ²), and neither σ nor ρ. So that is sampled, and σ follows; what grows with
-    the force is counted in a unit as much larger.
+    Where neighbours are highly correlated rows show what each adds to the one before,
+    σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of what grows
+    with the force is divided by √(1 − ρ²).
     """
-    name, prior, unshared = "sigma", problem.priors["sigma"], 1.0
+    prior, unshared = problem.priors["sigma"], 1.0
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
         unshared = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
-    if problem.correlated and prior.family != "fixed":
-        law = _scaled_and_moved(distribution(prior, name), unshared, 0.0)
-        added = jnp.asarray(numpyro.sample("_added_sd", law))
-        values[name] = numpyro.deterministic(name, added / unshared)
+        values["sigma"] = sample_moved("sigma", prior, "_added_sd", unshared)
     else:
-        values[name] = sample_site(name, prior)
+        values["sigma"] = sample_site("sigma", prior)
     for effect in problem.effects:
         if effect.stage == "noise":
             _sample_effect(problem, effect, values, unshared)
@@ -149,7 +167,38 @@ def _sample_effect(
         values[name] = sample_amplitude(name, problem.priors[name], unit)
 
 
-def _sample_members(name: str, sd, seen_sd, count: int):
+def _sample_members(problem: Problem, values: dict) -> None:
+    """Sample runs, specimens and the discrepancy, and their scales."""
+    integrated, priors = problem.integrated, problem.priors
+    if problem.runs:
+        name = "run_offset_sd"
+        values[name] = sample_site(name, priors[name])
+        if problem.zero_stated:
+            _widen_zero(problem, values)
+        if "run" not in integrated:
+            seen = _mean_sd(problem, values, problem.runs)
+            values["run_offset"] = _sample_deviations(
+                "run_offset", values[name], seen, problem.runs
+            )
+    if problem.specimens:
+        name = "specimen_sd"
+        values[name] = sample_site(name, priors[name])
+        if "specimen" not in integrated:
+            usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
+            seen = _mean_sd(problem, values, problem.specimens) / usual
+            values["specimen_deviation"] = _sample_deviations(
+                "specimen_deviation", values[name], seen, problem.specimens
+            )
+    if (gap := problem.discrepancy) is not None:
+        for name in ("gap_sd", "gap_length"):
+            values[name] = sample_site(name, priors[name])
+        if "discrepancy" not in integrated:
+            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
+            scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
+            values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
+
+
+def _sample_deviations(name: str, sd, seen_sd, count: int):
     """Sample how far each tested member is from the mean of the tested members.
 
     Partially centred: a score counts in sds that a member has given its own readings
@@ -160,7 +209,7 @@ def _sample_members(name: str, sd, seen_sd, count: int):
     Args:
         name: of the members.
         sd: between members.
-        seen_sd: about how well its own readings tell a member.
+        seen_sd: about how well its own readings determine a member.
         count: of the members.
     """
     spread = jnp.sqrt(1.0 + (sd / seen_sd) ** 2)
@@ -182,60 +231,10 @@ def _mean_square(problem: Problem, column):
 
 
 def _widen_zero(problem: Problem, values: dict) -> None:
-    """Put the effective prior of the zero in the place of that of the gauge itself."""
+    """Replace the prior of the gauge's zero by that of the mountings' mean zero."""
     name = "force_offset"
     gauge, both = (
         jnp.asarray(distribution(priors[name], name).log_prob(values[name]))
         for priors in (problem.priors, problem.priors_given(values))
     )
     numpyro.factor("_zero", both - gauge)
-
-
-def _sample_structure(problem: Problem, values: dict) -> None:
-    """Sample what belongs to runs, specimens and the discrepancy, and their scales."""
-    integrated, priors = problem.integrated, problem.priors
-    if problem.runs:
-        values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
-        if problem.zero_stated:
-            _widen_zero(problem, values)
-        if "run" not in integrated:
-            sd = values["run_offset_sd"]
-            seen = _mean_sd(problem, values, problem.runs)
-            members = _sample_members("run_offset", sd, seen, problem.runs)
-            values["run_offset"] = members
-    if problem.specimens:
-        values["specimen_sd"] = sample_site("specimen_sd", priors["specimen_sd"])
-        if "specimen" not in integrated:
-            sd, name = values["specimen_sd"], "specimen_deviation"
-            usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
-            seen = _mean_sd(problem, values, problem.specimens) / usual
-            values[name] = _sample_members(name, sd, seen, problem.specimens)
-    if (gap := problem.discrepancy) is not None:
-        for name in ("gap_sd", "gap_length"):
-            values[name] = sample_site(name, priors[name])
-        if "discrepancy" not in integrated:
-            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
-            scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
-            values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
-
-
-def declare(problem: Problem) -> None:
-    """Declare the joint density of parameters and data of the force model."""
-    priors = problem.priors
-    values = sample_stiffness(priors)
-    slack = any(effect.name == "seating_slack" for effect in problem.effects)
-    later = {CONTACT: slack, "force_offset": problem.far}
-    for name in ("alpha", "force_offset", CONTACT):
-        if not later.get(name):
-            values[name] = sample_site(name, priors[name])
-    if problem.far:
-        values["force_offset"] = _sample_zero(problem, values)
-    _sample_noise(problem, values)
-    for effect in problem.effects:
-        if effect.stage != "noise":
-            _sample_effect(problem, effect, values)
-    if slack:
-        values[CONTACT] = _sample_contact(problem, values)
-    _sample_structure(problem, values)
-    numpyro.deterministic("stiffness", stiffness(problem, values))
-    numpyro.factor("force", log_likelihood(problem, values))

@@ -5,14 +5,13 @@ calibration below it and its probability among the attributes.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import xarray as xr
 
 from hdcal.data.case import Case
-from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import HYPOTHESIS, Posterior
 from hdcal.inference.posterior_file import (
     CALIBRATION,
@@ -31,12 +30,11 @@ Library = Mapping[str, type[Effect]]
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Hypotheses of a diagnosis that were not calibrated, or whose calibration failed.
+    """Hypotheses of a diagnosis without a usable calibration.
 
     Attributes:
         probability: of them all.
-        counted_as: the calibrated hypothesis that carries their probability beside its
-            own.
+        counted_as: the calibrated hypothesis to which their probability is added.
     """
 
     probability: float
@@ -127,25 +125,23 @@ class ModelAverage:
         return cls(posteriors, left_out)
 
 
-def load_models(path: Path | str) -> Posterior | ModelAverage:
+def load_models(
+    path: Path | str, kinds: Collection[type[Posterior]] = ()
+) -> Posterior | ModelAverage:
     """Read a calibration of the gear at rest, or the models of a diagnosis.
+
+    Args:
+        path: a result folder or its posterior.nc.
+        kinds: further kinds of posteriors that may be read.
 
     Raises:
         InputError: as `Posterior.load`.
         NotUsable: the diagnosis failed.
     """
-    return _load(path, {})
-
-
-def load_any(path: Path | str) -> Posterior | ModelAverage:
-    """Read what `load_models` reads, or a calibration of the moving gear."""
-    return _load(path, {DynamicPosterior.kind: DynamicPosterior})
-
-
-def _load(path: Path | str, kinds: Mapping[str, type[Posterior]]):
     file = file_of(path)
     tree = read_tree(file)
     if "model" not in tree.attrs:
         return ModelAverage.from_tree(tree, file)
-    kind = json.loads(tree.attrs["model"])["kind"]
-    return kinds.get(kind, Posterior).from_tree(tree, file)
+    written = json.loads(tree.attrs["model"])["kind"]
+    kind = next((kind for kind in kinds if kind.kind == written), Posterior)
+    return kind.from_tree(tree, file)

@@ -3,25 +3,27 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc, ndtr
+from jaxtyping import Float
+from scipy.special import ndtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
-from hdcal.inference.loop_cells import loop_cells
+from hdcal.exported import jit
+from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import previous_rows, whiten
+from hdcal.physics.history import stop_cells
 
 # Fewer rows do not show how their noise depends on anything.
 _LEAST_ROWS = 12
-# Noise sds over a range that differ by less are one: of very many rows any would show.
+# Noise sds over a range that differ by less count as one.
 _LEAST_GROWTH = 1.1
-# Degrees of freedom that the noise beside a loop has at least: with fewer all is loop.
-_FEWEST_FREE = 4
 # Correlation of neighbours that is taken off residuals, at most.
 _MOST_ALIKE = 0.95
 # Shares of the range after which the cells of a loop slip.
 _REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
-# Probability that noise of one size is let grow: one parameter more, near nothing.
+# Probability that growth is found in noise of one size.
 _FALSE_ALARM = 0.05
+_stop_cells = jit(stop_cells)
 
 
 @dataclass(frozen=True)
@@ -31,20 +33,18 @@ class Pilot:
     Attributes:
         residual: of each row [N].
         noise_sd: of the noise [N].
-        free: degrees of freedom that it has.
     """
 
     residual: np.ndarray
     noise_sd: float
-    free: int
 
 
 def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
-    """Fit records by generous least squares.
+    """Fit records by generous least squares within runs.
 
     Generous, because too small a noise only chooses the exact rounding likelihood,
-    which is never wrong. A cubic in deformation with a slope for each specimen, a step
-    for the direction and temperature terms, within runs.
+    which is never wrong: a cubic in deformation with a slope for each specimen, a step
+    for the direction and temperature terms.
 
     Args:
         records: the rows.
@@ -68,15 +68,27 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
     free = max(len(force) - int(np.max(run)) - 1 - int(rank), 1)
-    return Pilot(residual, float(np.sqrt(residual @ residual / free)), free)
+    return Pilot(residual, float(np.sqrt(residual @ residual / free)))
+
+
+def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:
+    """Return the states of cells that stick and then slip, −1 … 1, row by row.
+
+    Args:
+        records: the rows.
+        shares: of the range of the deformation, after which a cell slips, shape (c,).
+    """
+    padded = pad_records(records)
+    reach = shares * np.ptp(np.asarray(records.deformation))
+    states = _stop_cells(padded.deformation, padded.run, reach)
+    return np.asarray(states)[:, : len(records.run)]
 
 
 def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     """Return whether readings clearly scatter more the farther the gear is deformed.
 
-    Not by so little that it matters to nobody. Not asked where every row's sd is
-    stated, nor below the steps of the reading. What a loop leaves at its turns is no
-    noise.
+    By more than a tenth over the range, with no sd of each row stated and no step of
+    the reading wider than the noise. What a loop leaves at its turns is no noise.
 
     Args:
         case: records and gear.
@@ -87,28 +99,16 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
     if "unloading" in records.known:
-        looped = pilot_fit(records, with_loop=True)
-        pilot = looped if _is_better(looped, pilot) else pilot
+        pilot = pilot_fit(records, with_loop=True)
     square = _added(pilot.residual, previous_rows(records)) ** 2
     clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
     return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
 
 
-def _is_better(larger: Pilot, smaller: Pilot) -> bool:
-    """Return whether what a larger model adds is seen, by the F test."""
-    more = smaller.free - larger.free
-    if more <= 0 or larger.free < _FEWEST_FREE:
-        return False
-    one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
-    ratio = (one - two) / more * larger.free / max(two, 1e-300)
-    return float(fdtrc(more, larger.free, ratio)) < _FALSE_ALARM
-
-
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Return what each row adds to the row before it, on one scale.
 
-    Where neighbours err alike the squares of their errors come in waves, which pass for
-    growth twice or three times as often as those of independent ones.
+    Squares of correlated errors come in waves, which pass for growth too often.
     """
     follows, square = before >= 0, float(residual @ residual)
     if not follows.any() or not square > 0.0:

@@ -1,13 +1,11 @@
 """Row buckets: few array lengths, so that few executables serve data of every size.
 
-JAX compiles one executable for each shape of its arguments and keeps it as long as
-the process lives; each takes some twenty of the 65,530 memory mappings that Linux
-allows a process. Rows are therefore padded, outside of what is compiled, to one of a
-few lengths. Padding counts for nothing: where rows are summed, `measured` or a weight
-of zero leaves it out.
+JAX compiles one executable for each shape of its arguments. Rows are therefore padded,
+outside of what is compiled, to one of a few lengths. Where rows are summed, `measured`
+or a weight of zero leaves the padding out.
 """
 
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -47,37 +45,23 @@ def repeat_last_row(tree: Tree, size: int) -> Tree:
         tree: pytree of arrays that share their first axis.
         size: rows in all, as `bucket_size` gives it.
     """
+    return jax.tree.map(lambda array: _padded(array, size, "edge"), tree)
 
-    def padded(array) -> np.ndarray:
-        array = np.asarray(array)
-        whole = np.empty((size, *array.shape[1:]), array.dtype)
-        whole[: len(array)] = array
-        whole[len(array) :] = array[-1]
-        return whole
 
-    return jax.tree.map(padded, tree)
+def append_zeros(tree: Tree, size: int) -> Tree:
+    """Return arrays followed by rows of zeros; arguments as `repeat_last_row`."""
+    return jax.tree.map(lambda array: _padded(array, size, "constant"), tree)
+
+
+def _padded(array, size: int, mode: Literal["edge", "constant"]) -> np.ndarray:
+    array = np.asarray(array)
+    width = [(0, size - len(array)), *[(0, 0)] * (array.ndim - 1)]
+    return np.pad(array, width, mode)
 
 
 def pad_records(records: Records) -> Records:
     """Return records with their last row repeated up to the size of their bucket."""
     return repeat_last_row(records, bucket_size(len(records.force)))
-
-
-def append_zeros(tree: Tree, size: int) -> Tree:
-    """Return arrays followed by rows of zeros, such as weights and design rows.
-
-    Args:
-        tree: pytree of arrays that share their first axis.
-        size: rows in all, as `bucket_size` gives it.
-    """
-
-    def padded(array) -> np.ndarray:
-        array = np.asarray(array)
-        whole = np.zeros((size, *array.shape[1:]), array.dtype)
-        whole[: len(array)] = array
-        return whole
-
-    return jax.tree.map(padded, tree)
 
 
 def measured(size: int, count) -> Bool[Array, " n"]:

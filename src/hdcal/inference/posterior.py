@@ -1,7 +1,7 @@
 """The calibrated posterior: draws, what they rest on, and whether they may be used."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -39,6 +39,7 @@ from hdcal.physics.effect import Effect
 # The setting with the structure of the model, and the one with the hypothesis of a
 # diagnosis that the model is of.
 STRUCTURE, HYPOTHESIS = "structure", "hypothesis"
+_WORDS = {"static": "of the gear at rest", "dynamic": "of the moving gear"}
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,6 +70,14 @@ class Posterior(Shown):
     checks: tuple[Check, ...]
     settings: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        names = ", ".join(effect.name for effect in self.effects) or "none"
+        state = "usable" if self.usable else "FAILED, do not use"
+        return (
+            f"<Posterior of {self.case.name}: {len(self.draws['K'])} draws, "
+            f"theory {self.theory}, effects {names}, {state}>"
+        )
+
     @property
     def sites(self) -> dict[str, tuple[int, ...]]:
         """Shape of each parameter that a draw holds."""
@@ -78,14 +87,6 @@ class Posterior(Shown):
     def structure(self) -> ModelStructure:
         """What the model contains beside line and effects."""
         return ModelStructure(**self.settings[STRUCTURE])
-
-    def __repr__(self) -> str:
-        names = ", ".join(effect.name for effect in self.effects) or "none"
-        state = "usable" if self.usable else "FAILED, do not use"
-        return (
-            f"<Posterior of {self.case.name}: {len(self.draws['K'])} draws, "
-            f"theory {self.theory}, effects {names}, {state}>"
-        )
 
     @property
     def usable(self) -> bool:
@@ -112,13 +113,8 @@ class Posterior(Shown):
     @cached_property
     def problem(self) -> Problem:
         """The inference problem that was sampled."""
-        return build_problem(
-            self.case,
-            self.priors,
-            self.effects,
-            theory=self.theory,
-            structure=self.structure,
-        )
+        given = {"theory": self.theory, "structure": self.structure}
+        return build_problem(self.case, self.priors, self.effects, **given)
 
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
@@ -206,8 +202,10 @@ class Posterior(Shown):
         try:
             model = json.loads(tree.attrs["model"])
             if model["kind"] != cls.kind:
-                raise InputError([_of_another_kind(file, cls.kind)])
-            found = cls(
+                problem = f"is a calibration {_WORDS[model['kind']]}"
+                remedy = f"Name the folder of a calibration {_WORDS[cls.kind]}"
+                raise InputError([Finding(str(file), problem, remedy)])
+            posterior = cls(
                 case=restore_case(tree.attrs["case"], tree),
                 theory=model["theory"],
                 effects=_look_up(model["effects"], effects, file),
@@ -217,47 +215,28 @@ class Posterior(Shown):
                 checks=tuple(Check(**check) for check in model["checks"]),
                 settings=model["settings"],
             )
-            found._check_draws()
+            drawn = group_of(tree, "posterior")
+            for name, shape in posterior.sites.items():
+                one = drawn[name]
+                if one.dims[:2] != OVER_DRAWS or one.shape[2:] != shape:
+                    raise ValueError(f"{name} has another shape")
+                if not np.isfinite(one).all():
+                    raise ValueError(f"{name} is not finite")
         except (KeyError, ValueError, TypeError) as error:
             raise not_a_posterior(file) from error
-        return found
-
-    def _check_draws(self) -> None:
-        """Check that the draws are those of the model.
-
-        Raises:
-            KeyError, ValueError: they are not.
-        """
-        drawn = group_of(self.tree, "posterior")
-        for name, shape in self.sites.items():
-            one = drawn[name]
-            if one.dims[:2] != OVER_DRAWS or one.shape[2:] != shape:
-                raise ValueError(f"{name} has another shape")
-            if not np.isfinite(one).all():
-                raise ValueError(f"{name} is not finite")
-
-
-def _of_another_kind(file: Path, wanted: str) -> Finding:
-    needed, other = "of the gear at rest", "of the moving gear"
-    if wanted == "dynamic":
-        needed, other = other, needed
-    remedy = f"Name the folder of a calibration {needed}"
-    return Finding(str(file), f"is a calibration {other}", remedy)
+        return posterior
 
 
 def _look_up(
-    names: Sequence[str], library: Mapping[str, type[Effect]] | None, file: Path
+    names: list[str], library: Mapping[str, type[Effect]] | None, file: Path
 ) -> tuple[type[Effect], ...]:
     if library is None:
         from hdcal.physics.registry import EFFECTS as library
+    remedy = "pass a library that holds it: Posterior.load(path, effects=…)"
     unknown = [name for name in names if name not in library]
     if unknown:
         raise InputError(
-            Finding(
-                str(file),
-                f"the effect '{name}' is not in the library",
-                "pass a library that holds it: Posterior.load(path, effects=…)",
-            )
+            Finding(str(file), f"the effect '{name}' is not in the library", remedy)
             for name in unknown
         )
     return tuple(library[name] for name in names)

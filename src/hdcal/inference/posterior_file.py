@@ -38,12 +38,6 @@ class Kind(NamedTuple):
 
 CALIBRATION = Kind("hdcal.posterior", "of a calibration", "calibrate again")
 FLEET = Kind("hdcal.fleet-posterior", "of a fleet", "run hdcal fleet again")
-# Answers without a posterior file.
-_WITHOUT = {
-    "hdcal.compare/1": "a comparison has no posterior",
-    "hdcal.causes/1": "causes across gears have no posterior",
-    "hdcal.verdict/2": "a quick diagnosis holds no calibrated model",
-}
 
 
 def file_of(path: Path | str) -> Path:
@@ -100,14 +94,14 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
-    written = tree.attrs.get(FORMAT)
-    if (found := _kind(written)) is None:
+    format_name = tree.attrs.get(FORMAT)
+    if (written := _kind(format_name)) is None:
         raise not_a_posterior(path, kind)
-    if found is not kind:
-        problem = f"is {found.words}, and one {kind.words} is needed"
+    if written is not kind:
+        problem = f"is {written.words}, and one {kind.words} is needed"
         remedy = f"Name the result folder {kind.words}"
-    elif written != kind.format:
-        problem = f"has the format {written}, and this hdcal reads {kind.format}"
+    elif format_name != kind.format:
+        problem = f"has the format {format_name}, and this hdcal reads {kind.format}"
         remedy = f"Use the hdcal that wrote it, or {kind.again}"
     elif tree.attrs.get(DIGEST) != digest(tree):
         problem = "was changed after hdcal wrote it"
@@ -152,7 +146,7 @@ def _kind(written: object) -> Kind | None:
 
 
 def _missing(path: Path) -> Finding:
-    """Return the finding for a missing file, by the answer beside it.
+    """Return the finding for a missing file, by the answer in the same folder.
 
     Raises:
         NotUsable: the answer is of a diagnosis that failed.
@@ -161,7 +155,7 @@ def _missing(path: Path) -> Finding:
     for name in ("summary.json", "verdict.json"):
         try:
             answer = json.loads((path.parent / name).read_bytes())
-            problem = _WITHOUT.get(answer["schema"], problem)
+            problem = f"the result {answer['schema']} in this folder has no posterior"
             failed = answer["status"] == "failed"
         except (OSError, ValueError, KeyError, TypeError):
             continue

@@ -1,6 +1,7 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import numpy as np
@@ -14,15 +15,10 @@ from hdcal.data.records import Array, Records, lies_far
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
-from hdcal.inference.amplitude_units import amplitude_units
-from hdcal.inference.compress import CompressedRows, keep_or_compress
+from hdcal.inference.compression import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
 from hdcal.inference.distributions import effective_priors
-from hdcal.inference.member_counts import (
-    check_member_counts,
-    integrated_kinds,
-    member_counts,
-)
+from hdcal.inference.members import integrated_kinds, member_counts
 from hdcal.inference.padding import pad_records
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.structure import ModelStructure, decide_structure
@@ -35,7 +31,7 @@ _base_columns = jit(linear_columns)
 
 
 class Problem(Sampled):
-    """Everything the model needs; only arrays change between data sets of one shape.
+    """The force model of one case; only arrays change between data sets of one shape.
 
     Attributes:
         priors: by site name, in code units; K under the problem's own theory.
@@ -49,16 +45,16 @@ class Problem(Sampled):
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
-        runs: number of runs with an offset of their own, 0 = none.
-        specimens: number of specimens with a stiffness of their own, 0 = none.
+        runs: number of runs with a zero each, 0 = none.
+        specimens: number of specimens with a stiffness each, 0 = none.
         integrated: which of "run", "specimen", "discrepancy" are integrated out, as
             `integrated_kinds` orders them.
         centre: middle of the deformations as read [mm].
-        far: whether they lie far from the origin, beside their range.
+        far: whether they lie far from the origin, compared with their range.
         count: measured rows; `records` and `columns` have padding after them.
         before: index of the row before each padded row in its run, −1 for none; or
             None where neighbours are not correlated or rows are compressed.
-        correlated: whether neighbouring readings of a run may err alike.
+        correlated: whether neighbouring readings of a run may be correlated.
         zero_stated: a certificate states the zero of the force gauge itself, to which
             each mounting adds its own, see `priors_given`.
     """
@@ -112,9 +108,9 @@ class Problem(Sampled):
 
 
 def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return priors without their texts.
+    """Return priors without unit and source, which are static.
 
-    Text is static: left in, another source line would mean another compilation.
+    Left in, another source line would mean another compilation.
     """
     return {
         name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
@@ -123,11 +119,10 @@ def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
 
 
 def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Return the effects less those that the model's own members carry.
+    """Return the effects that have sites of their own.
 
-    Runs have a zero and specimens a stiffness of their own whenever there are two,
-    with the priors `run_offset_sd` and `specimen_sd`: a second spread beside each
-    would only share it.
+    Effects of scatter have none: wherever there are two runs or specimens these are
+    members of the model, with the priors `run_offset_sd` and `specimen_sd`.
     """
     return tuple(effect for effect in effects if not issubclass(effect, Scatter))
 
@@ -191,23 +186,6 @@ def unit_stiffness(case: Case, theory: Theory) -> float:
     return float(THEORIES[theory](case.gear.geometry, 1.0))
 
 
-def _checked(case: Case, effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Return the effects that have sites, all of which these data can bear."""
-    findings = [
-        Finding(
-            case.name,
-            f"effect '{effect.name}' needs {need}, which these data do not have",
-            "measure it, or leave the effect out",
-        )
-        for effect in effects
-        for need in sorted(effect.needs - case.records.known)
-    ]
-    if findings:
-        raise InputError(findings)
-    effects = without_scatter(effects)
-    return effects
-
-
 def build_problem(
     case: Case,
     shipped: Mapping[str, Prior],
@@ -221,30 +199,35 @@ def build_problem(
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: in the model; those of scatter change nothing, members carry them.
+        effects: in the model; those of scatter change nothing.
         theory: overrides the gear's theory.
         structure: of the model; by default what the readings show.
 
     Raises:
         InputError: an effect lacks its covariates or a prior.
     """
-    effects, theory = _checked(case, effects), theory or case.gear.theory
+    check_covariates(case, effects)
+    effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
     form = structure or decide_structure(case, effects)
-    members = member_counts(case, form.with_gap)
     leftover = build_discrepancy(records, effects) if form.with_gap else None
     columns, keep = _columns(records, reading), form.rounded or bool(effects)
     rows = keep_or_compress(records, columns, leftover, keep, form.correlated)
-    compressed = rows["blocks"] is not None
-    linear = _linear_members(effects, form.rounded, compressed=compressed)
-    integrated = integrated_kinds(members, linear)
-    check_member_counts(case.name, members, integrated)
-    return Problem(
+    linear = set()
+    if not (form.rounded or any(effect.mixture for effect in effects)):
+        linear = {"run", "discrepancy"}
+        # Through an effect the force need not be linear in the stiffness.
+        linear |= {"specimen"} if rows["blocks"] is not None else set()
+    members = member_counts(case, form.with_gap)
+    problem = Problem(
         priors=without_texts(priors),
-        units=amplitude_units(
-            records, columns, reading, effects, priors, form.noise_sd
-        ),
+        units={
+            f"{effect.name}.{field}": float(prior.numbers[0])
+            for effect in effects
+            for field in parameters(effect)
+            if (prior := priors[f"{effect.name}.{field}"]).family == "half_normal"
+        },
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         discrepancy=leftover,
@@ -254,20 +237,38 @@ def build_problem(
         correlated=form.correlated,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
-        integrated=integrated,
+        integrated=integrated_kinds(case.name, members, frozenset(linear)),
         zero_stated=is_stated(case.gear.priors["force_offset"]),
         centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
         far=lies_far(records),
         **rows,
     )
+    if not problem.units:
+        return problem
+    # Late: sensitivities are those of a problem.
+    from hdcal.inference.identifiability import resolved_units
+
+    units = resolved_units(problem, records, columns, form.noise_sd)
+    return replace(problem, units=units)
 
 
-def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:
-    """Return the kinds of members that enter a Gaussian likelihood linearly."""
-    if rounded or any(effect.mixture for effect in effects):
-        return frozenset()
-    # Through an effect the force need not be linear in the stiffness.
-    return frozenset({"run", "discrepancy", *(["specimen"] if compressed else [])})
+def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
+    """Check that the data have what the effects need.
+
+    Raises:
+        InputError: an effect lacks a covariate.
+    """
+    findings = [
+        Finding(
+            case.name,
+            f"effect '{effect.name}' needs {need}, which these data do not have",
+            "measure it, or leave the effect out",
+        )
+        for effect in effects
+        for need in sorted(effect.needs - case.records.known)
+    ]
+    if findings:
+        raise InputError(findings)
 
 
 def _columns(records: Records, reading: Reading) -> np.ndarray:

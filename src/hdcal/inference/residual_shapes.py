@@ -1,6 +1,7 @@
-"""Shapes in residuals: which ones are looked for, and the test that finds them."""
+"""Shapes in residuals: a table of columns, and a t test of each."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -9,10 +10,11 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
 
-# Family-wise probability that pure noise is said to have a shape.
+# Family-wise probability that a shape is found in pure noise.
 FALSE_ALARM = 0.01
-# Correlations that are tried, and the largest: nearer to 1 is as good as that.
+# Quantiles of the prior of a correlation, and the largest that is tried.
 _CORRELATIONS, _CLOSEST = 128, 0.99
+_TINY = np.finfo(float).tiny
 
 # Name -> (column, words if positive, words if negative).
 Shapes = dict[str, tuple[np.ndarray, str, str]]
@@ -20,7 +22,7 @@ Shapes = dict[str, tuple[np.ndarray, str, str]]
 
 @dataclass(frozen=True)
 class Structure:
-    """One shape that was found in the residuals.
+    """One shape that noise would rarely have.
 
     Attributes:
         name: what they depend on.
@@ -59,7 +61,7 @@ class Whitened:
 
 @dataclass(frozen=True)
 class Correlated:
-    """Noise whose neighbours may err alike.
+    """Noise whose neighbours may be correlated.
 
     Attributes:
         before: index of the row before each in its run, −1 for none, shape (n,).
@@ -70,11 +72,32 @@ class Correlated:
     prior: Prior
 
 
+class _Test(NamedTuple):
+    """A t test of one column.
+
+    Attributes:
+        p_value: two-sided.
+        coefficient: of the remainder.
+        error: its standard error.
+        remainder: what the model leaves of the column, of unit length.
+        name: of the column.
+    """
+
+    p_value: float
+    coefficient: float
+    error: float
+    remainder: np.ndarray
+    name: str
+
+
 def shapes_of(records: Records, reference_temperature: float) -> Shapes:
     """Return the shapes to look for in the residuals of these records."""
     deformation = np.asarray(records.deformation)
     scaled = deformation / np.max(np.abs(deformation))
     rise = np.asarray(records.temperature) - reference_temperature
+    rows = np.arange(len(scaled), dtype=float)
+    drift = "with temperature: the zero of the reading drifts with it"
+    slope = "with temperature in proportion to deformation"
     shapes: Shapes = {
         "curvature": (
             scaled * np.abs(scaled),
@@ -91,23 +114,15 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
             "are higher on loading than on unloading",
             "are lower on loading than on unloading",
         ),
-        "temperature": (
-            rise,
-            "rise with temperature: the zero of the reading drifts with it",
-            "fall with temperature: the zero of the reading drifts with it",
-        ),
-        "temperature x deformation": (
-            rise * scaled,
-            "rise with temperature in proportion to deformation",
-            "fall with temperature in proportion to deformation",
-        ),
+        "temperature": (rise, f"rise {drift}", f"fall {drift}"),
+        "temperature x deformation": (rise * scaled, f"rise {slope}", f"fall {slope}"),
         "time": (
             np.asarray(records.time),
             "rise with time since the reset",
             "fall with time since the reset",
         ),
         "order": (
-            np.arange(len(scaled), dtype=float),
+            rows,
             "rise from the first row to the last",
             "fall from the first row to the last",
         ),
@@ -125,32 +140,34 @@ def find_structure(
     Args:
         data: residuals, sensitivities and shapes.
         sd: noise sd of each row [N].
-        noise: how neighbours may err alike; None where they do not in the model.
-        looks: how often the same shapes are looked for.
+        noise: how neighbours may be correlated; None where they are not in the model.
+        looks: number of searches for the same shapes.
 
     Returns:
         The shapes found, each at a family-wise error of `FALSE_ALARM`, Bonferroni
         over the shapes still tried, in all looks.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed
-    found: list[Structure] = []
+    structures: list[Structure] = []
     while shapes:
         columns = {name: column for name, (column, _, _) in shapes.items()}
         tests = _tests(data.residual, columns, orthonormal(absorbed), noise)
         if not tests:
             break
-        p, part, error, left, name = min(tests, key=lambda test: test[0])
-        p = min(1.0, p * len(tests) * looks)
+        best = min(tests, key=lambda test: test.p_value)
+        p = min(1.0, best.p_value * len(tests) * looks)
         if p > FALSE_ALARM:
             break
-        rms = float(abs(part) * np.sqrt(np.mean((left[: len(sd)] * sd) ** 2)))
-        column, up, down = shapes.pop(name)
-        words = f"The residuals {up if part > 0.0 else down} ({rms:.2g} N rms)."
-        # What is left of the column is of unit length.
-        length = float(left @ column)
-        found.append(Structure(name, p, rms, words, part / length, error / length))
+        column, up, down = shapes.pop(best.name)
+        shape = best.coefficient * best.remainder[: len(sd)] * sd
+        rms = float(np.sqrt(np.mean(shape**2)))
+        way = up if best.coefficient > 0.0 else down
+        words = f"The residuals {way} ({rms:.2g} N rms)."
+        scale = float(best.remainder @ column)
+        size = best.coefficient / scale, best.error / scale
+        structures.append(Structure(best.name, p, rms, words, *size))
         absorbed = np.column_stack([absorbed, column])
-    return tuple(found)
+    return tuple(structures)
 
 
 def orthonormal(absorbed: np.ndarray) -> np.ndarray:
@@ -166,84 +183,69 @@ def _tests(
     columns: dict[str, np.ndarray],
     basis: np.ndarray,
     noise: Correlated | None,
-) -> list[tuple[float, float, float, np.ndarray, str]]:
-    """Test each column beside what is absorbed, by generalised least squares.
+) -> list[_Test]:
+    """Test each column given what is absorbed, by generalised least squares.
 
-    Where neighbours may err alike the p value is that given ρ, averaged over what the
-    data say of ρ with that column in the model: a bend alone passes for correlation.
+    Where neighbours may be correlated the p value is that given ρ, averaged over
+    what the data say of ρ with that column in the model: a bend alone passes for
+    correlation.
 
     Args:
         residual: in noise sds, shape (n,).
         columns: likewise, by name.
         basis: from `orthonormal`.
-        noise: how neighbours may err alike.
+        noise: how neighbours may be correlated.
 
     Returns:
-        p value, coefficient of the unit-length remainder and its standard error, that
-        remainder and the name, of what the model does not absorb; nothing where too
-        few rows are left.
+        A test of each column that the model does not absorb; none where too few rows
+        are left.
     """
-
-    def beside(part):
-        return part - basis @ (basis.T @ part)
-
     size, free = basis.shape[1], len(residual) - basis.shape[1] - 1
-    rests = {name: beside(column) for name, column in columns.items()}
-    units = {
-        name: rest / np.linalg.norm(rest)
-        for name, rest in rests.items()
-        # Nearly all of it is absorbed: the rest is rounding, not evidence.
-        if np.linalg.norm(rest) > 1e-3 * np.linalg.norm(columns[name])
-    }
+    units = {}
+    for name, column in columns.items():
+        rest = column - basis @ (basis.T @ column)
+        # Where nearly all of it is absorbed the rest is rounding, not evidence.
+        if (length := np.linalg.norm(rest)) > 1e-3 * np.linalg.norm(column):
+            units[name] = rest / length
     if free < 1 or not units:
         return []
-    table = np.column_stack([basis, *units.values(), beside(residual)])
-    squares, log_weight = _squares(table, noise)
-    held, mixed = squares[:, :size, :size], squares[:, :size, size:]
-    left = squares[:, size:, size:] - mixed.mT @ np.linalg.solve(held, mixed)
-    log_weight = log_weight - 0.5 * np.linalg.slogdet(held)[1]
+    left = residual - basis @ (basis.T @ residual)
+    table = np.column_stack([basis, *units.values(), left])
+    products, log_weight = _products(table, noise)
+    absorbed, mixed = products[:, :size, :size], products[:, :size, size:]
+    rest = products[:, size:, size:] - mixed.mT @ np.linalg.solve(absorbed, mixed)
+    log_weight = log_weight - 0.5 * np.linalg.slogdet(absorbed)[1]
     tests = []
     for index, (name, unit) in enumerate(units.items()):
-        own, tied = left[:, index, index], left[:, index, -1]
-        rest = np.maximum(left[:, -1, -1] - tied**2 / own, np.finfo(float).tiny)
-        log_chance = log_weight - 0.5 * (np.log(own) + free * np.log(rest))
+        square, cross = rest[:, index, index], rest[:, index, -1]
+        error = np.maximum(rest[:, -1, -1] - cross**2 / square, _TINY)
+        log_chance = log_weight - 0.5 * (np.log(square) + free * np.log(error))
         chance = special.softmax(log_chance)
-        error = np.sqrt(rest / (free * own))
-        p = chance @ (2.0 * special.stdtr(free, -np.abs(tied) / (own * error)))
-        part = chance @ (tied / own)
-        tests.append((float(p), float(part), float(chance @ error), unit, name))
+        sd = np.sqrt(error / (free * square))
+        t = np.abs(cross) / (square * sd)
+        p, coefficient, sd = (
+            float(chance @ each)
+            for each in (2.0 * special.stdtr(free, -t), cross / square, sd)
+        )
+        tests.append(_Test(p, coefficient, sd, unit, name))
     return tests
 
 
-def _squares(
-    table: np.ndarray, noise: Correlated | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return products of columns in which noise is independent, (m, k, k), for each ρ.
+def _products(table: np.ndarray, noise: Correlated | None):
+    """Return products of the columns whitened with each ρ, (m, k, k), and log weights.
 
-    And the logarithm of the prior weight of each ρ times the density of its whitening,
-    (m,). The sums of whitened rows need those over rows and the rows before them only.
+    The weight of ρ, (m,), is that of its prior times the density of the whitening.
     """
     if noise is None:
         return (table.T @ table)[None], np.zeros(1)
-    rho, weight = _correlations(noise.prior)
+    rho = np.array([noise.prior.numbers[0]], float)
+    if noise.prior.family != "fixed":
+        share = (np.arange(_CORRELATIONS) + 0.5) / _CORRELATIONS
+        rho = np.minimum(frozen(noise.prior).ppf(share), _CLOSEST)
     (follows,) = np.nonzero(noise.before >= 0)
-    own, before = table[follows], table[noise.before[follows]]
-    crossed, first = own.T @ before, np.delete(table, follows, axis=0)
+    now, before = table[follows], table[noise.before[follows]]
+    crossed, first = now.T @ before, np.delete(table, follows, axis=0)
     r = rho[:, None, None]
-    rows = own.T @ own - r * (crossed + crossed.T) + r**2 * (before.T @ before)
+    rows = now.T @ now - r * (crossed + crossed.T) + r**2 * (before.T @ before)
     volume = -0.5 * len(follows) * np.log1p(-(rho**2))
-    return first.T @ first + rows / (1.0 - r**2), np.log(weight) + volume
-
-
-def _correlations(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
-    """Return correlations over all of their prior, and the weight of each."""
-    if prior.family == "fixed":
-        return np.array([float(prior.numbers[0])]), np.ones(1)
-    law = frozen(prior)
-    ends = np.clip(law.ppf([1e-3, 1.0 - 1e-3]), 0.0, _CLOSEST)
-    # Of ρ = tanh² v the prior is smooth in v, see `model`.
-    low, high = np.arctanh(np.sqrt(ends))
-    v = np.linspace(low, high, _CORRELATIONS + 1)
-    v = 0.5 * (v[1:] + v[:-1])
-    rho = np.tanh(v) ** 2
-    return rho, law.pdf(rho) * np.tanh(v) / np.cosh(v) ** 2
+    return first.T @ first + rows / (1.0 - r**2), volume

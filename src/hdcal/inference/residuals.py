@@ -6,15 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
-from hdcal.inference.linearisation import Linearisation, linearise
+from hdcal.inference.identifiability import Linearisation, linearise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior import HYPOTHESIS, Posterior
-from hdcal.inference.problem import Problem
 from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
     Correlated,
@@ -33,12 +31,10 @@ _DRAWS = 200
 
 # How a warning begins that a shape is left in the residuals.
 SHAPED = "This takes the model's shape for right, but its residuals have one."
-_DIAGNOSE = "Diagnose", "Diagnose, or calibrate with a gap"
 _BESIDE = "That is left out, and little beside the noise."
 # Share of the noise below which a shape widens what one reading does by a twentieth.
 _SMALL = 1.0 / 3.0
 UNNAMED = "No cause named makes it"
-_DIAGNOSED = UNNAMED, f"{UNNAMED}: calibrate with a gap"
 
 
 @dataclass(frozen=True, repr=False)
@@ -75,16 +71,19 @@ def residuals(posterior: Posterior) -> Residuals:
     problem, records = posterior.problem, posterior.case.records
     padded = pad_records(records)
     columns = discrepancy_columns(problem.discrepancy, padded)
-    fitted = _fit(problem, _thinned(posterior.draws), padded, columns)
-    fitted = np.asarray(fitted)[: len(records.force)]
+    every = max(len(posterior.draws["K"]) // _DRAWS, 1)
+    thinned = {name: values[::every] for name, values in posterior.draws.items()}
+    fitted = np.asarray(_fit(problem, thinned, padded, columns))[: len(records.force)]
     residual = np.asarray(records.force) - fitted
     centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
     near = linearise(problem, centre, records)
     whitened = _whiten(posterior, centre, near, residual)
-    structure = find_structure(whitened, near.sd, _noise(problem, records))
+    noise = None
+    if problem.correlated:
+        noise = Correlated(previous_rows(records), problem.priors[CORRELATION])
+    structure = find_structure(whitened, near.sd, noise)
     shapes = [whitened.shapes[shape.name][0] for shape in structure]
     rest = replace(whitened, absorbed=np.column_stack([whitened.absorbed, *shapes]))
-    coarse = float(problem.step) > float(np.median(near.sd))
     return Residuals(
         deformation=np.asarray(records.deformation),
         temperature=np.asarray(records.temperature),
@@ -99,16 +98,11 @@ def residuals(posterior: Posterior) -> Residuals:
             rest,
             records,
             near.sd,
-            rounded=coarse,
+            rounded=float(problem.step) > float(np.median(near.sd)),
             mixed=any(effect.mixture for effect in posterior.effects),
             correlation=float(correlation_of(centre)),
         ),
     )
-
-
-def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    every = max(len(draws["K"]) // _DRAWS, 1)
-    return {name: values[::every] for name, values in draws.items()}
 
 
 @jit
@@ -122,31 +116,24 @@ def _fit(problem, values, records, columns):
     return total / len(values["K"])
 
 
-def _noise(problem: Problem, records: Records) -> Correlated | None:
-    if not problem.correlated:
-        return None
-    return Correlated(previous_rows(records), problem.priors[CORRELATION])
-
-
 def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whitened:
-    """Bring residuals, sensitivities and shapes to noise and prior sds."""
-    records, sd = posterior.case.records, near.sd
-    priors = posterior.problem.priors_given(centre)
-    table, pull = [near.members], [-near.place]
+    """Return residuals, sensitivities and shapes in noise and prior sds."""
+    sd, priors = near.sd, posterior.problem.priors_given(centre)
+    columns, pull = [near.members], [-near.place]
     for name, slope in near.slopes.items():
         mean, prior_sd = moments(priors[name], name)
-        table.append(slope[:, None] * prior_sd)
+        columns.append(slope[:, None] * prior_sd)
         pull.append(np.array([(mean - centre[name]) / prior_sd]))
     below = np.concatenate(pull)
-    shapes = shapes_of(records, posterior.case.gear.reference_temperature)
+    reference = posterior.case.gear.reference_temperature
     return Whitened(
         residual=np.concatenate([residual / sd, below]),
-        absorbed=np.vstack(
-            [np.concatenate(table, axis=1) / sd[:, None], np.eye(len(below))]
-        ),
+        absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(below))]),
         shapes={
-            name: (np.concatenate([column / sd, np.zeros(len(below))]), up, down)
-            for name, (column, up, down) in shapes.items()
+            name: (np.concatenate([column / sd, 0.0 * below]), up, down)
+            for name, (column, up, down) in shapes_of(
+                posterior.case.records, reference
+            ).items()
         },
     )
 
@@ -155,27 +142,28 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     """Return a warning for all that the model left in the residuals.
 
     For answers that take the model for right. A leftover discrepancy has taken what
-    depends on the deformation alone; a loop, for one, it cannot take. Noise that is so
-    correlated that intervals are too narrow is told too.
+    depends on the deformation alone; a loop, for one, it cannot take. So is noise whose
+    correlation makes intervals too narrow.
 
     Args:
         posterior: from `calibrate`.
         shapes: whether to warn of them.
     """
     left = residuals(posterior)
+    diagnosed = HYPOTHESIS in posterior.settings
+    remedy = UNNAMED if diagnosed else "Diagnose"
+    if posterior.problem.discrepancy is None:
+        remedy += ": calibrate with a gap" if diagnosed else ", or calibrate with a gap"
+    small = _SMALL * float(np.median(posterior.draws["sigma"]))
+    structure = left.structure if shapes else ()
+    words = [
+        f"{SHAPED} {shape.words.rstrip('.')}. {remedy}."
+        for shape in structure
+        if shape.size_N > small
+    ]
+    words += [f"{s.words} {_BESIDE}" for s in structure if s.size_N <= small]
+    words += [fault.words for fault in left.noise]
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    remedies = _DIAGNOSED if HYPOTHESIS in posterior.settings else _DIAGNOSE
-    remedy = remedies[posterior.problem.discrepancy is None]
-    noise_sd = float(np.median(posterior.draws["sigma"]))
-    told = left.structure if shapes else ()
-    large = [shape for shape in told if shape.size_N > _SMALL * noise_sd]
-    return (
-        *(f"{SHAPED} {shape.words.rstrip('.')}. {remedy}." for shape in large),
-        *(f"{shape.words} {_BESIDE}" for shape in told if shape not in large),
-        *(fault.words for fault in left.noise),
-        *(
-            [f"{alike.words[:1].upper()}{alike.words[1:]}."]
-            if alike.outcome == "warning"
-            else []
-        ),
-    )
+    if alike.outcome == "warning":
+        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
+    return tuple(words)

@@ -1,8 +1,8 @@
-"""The sampler of record: NumPyro's NUTS in whitened coordinates.
+"""NumPyro's NUTS in whitened coordinates.
 
 One executable serves every data set of one bucket of rows, because data, priors and
 whitening are arguments of it. It advances in short stretches, so that progress can
-be shown and an interruption is heard.
+be shown and an interruption takes effect.
 """
 
 from collections.abc import Callable
@@ -17,31 +17,32 @@ from numpyro.infer.hmc import hmc
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.exported import jit
-from hdcal.inference.integrated import draw_members
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.laplace import Whitening, potential, values_at
-from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
+from hdcal.inference.marginal import draw_members
 from hdcal.inference.sampled_problem import Sampled
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
 
 MAX_TREE_DEPTH = 10
-# Mean acceptance aimed at; each further value is for a run that was not sound.
+# Mean acceptance aimed at; each further value is for a run with divergences.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
-# A run goes on until so many times the draws that were asked for.
+# A run is extended to at most so many times the draws that were asked for.
 _LONGEST = 4
-# Draws of a chain over the effective ones that it needs, from which their lack tells.
-_TELLING = 8
-# Place of the divergences in what `_advance` keeps of a draw.
-_DIVERGING = 3
+# Draws of a chain for each effective one that is needed; a shorter run is not extended.
+_ENOUGH = 8
 # Chains start this many posterior sds apart, so that R-hat can see them disagree.
 _OVERDISPERSION = 2.0
+# Fields of the sampler's state that are kept of each draw, `adapt_state` apart.
+_KEPT = ("z", "energy", "potential_energy", "diverging", "num_steps", "accept_prob")
+_DIVERGING = _KEPT.index("diverging")
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Draws and how they were come by; leading axes are chain and draw.
+    """Draws with the sampler's statistics; leading axes are chain and draw.
 
     Attributes:
         values: by site name, in code units.
@@ -62,6 +63,128 @@ class Draws:
     acceptance: np.ndarray
     step_size: np.ndarray
     target_acceptance: float
+
+
+def sample(
+    problem: Sampled,
+    whitening: Whitening,
+    seed: int,
+    *,
+    chains: int = 4,
+    warmup: int = 1000,
+    draws: int = 1000,
+    progress: Progress | None = None,
+) -> Draws:
+    """Draw from the posterior.
+
+    A run with divergent trajectories is discarded and repeated with shorter steps. A
+    run whose chains have not mixed is extended, to at most four times its length.
+
+    Args:
+        problem: the inference problem.
+        whitening: coordinates from `laplace.fit`.
+        seed: the same one gives the same draws.
+        chains: independent chains, one after the other in each stretch.
+        warmup: iterations of adaptation per chain, discarded.
+        draws: iterations kept per chain, or a multiple of them.
+        progress: called after every stretch.
+    """
+    begin = partial(_Run, problem, whitening, seed, chains, warmup, progress)
+    # At kinks of the density long steps diverge: they are not tried.
+    *longer, shortest = TARGET_ACCEPTANCE[problem.non_smooth :]
+    for target in longer:
+        run = begin(target)
+        run.advance(draws, stop_if_diverging=True)
+        if not run.diverged:
+            extended = _extended(run, draws)
+            if not extended.diverging.any():
+                return extended
+    run = begin(shortest)
+    run.advance(draws)
+    return _extended(run, draws)
+
+
+def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
+    """Check that a run is long enough for its own checks, and not endless.
+
+    Raises:
+        InputError: it is not.
+    """
+    given = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
+    with Findings() as wrong:
+        for name, value in given.items():
+            wrong += implausible(name, value)
+
+
+def _extended(run: "_Run", draws: int) -> Draws:
+    """Return the draws of a run, extended while its chains have not mixed."""
+    result = run.draws()
+    while (
+        _ENOUGH * ESS_PER_CHAIN <= result.energy.shape[1] < _LONGEST * draws
+        and not result.diverging.any()
+        and not have_mixed(_varying(result.values))
+    ):
+        run.advance(draws)
+        result = run.draws()
+    return result
+
+
+def _varying(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {n: v for n, v in values.items() if v.ndim == 2 and np.ptp(v) > 0.0}
+
+
+class _Run:
+    """All chains of one step size, which can be extended."""
+
+    def __init__(self, problem, whitening, seed, chains, warmup, progress, target):
+        self._arguments = jax.device_put((problem, whitening))
+        self._seed, self._warmup = seed, warmup
+        self._progress, self._target = progress, target
+        size = {"warmup": warmup, "chains": chains}
+        self._states = [
+            _start(*self._arguments, seed, chain, target, **size)
+            for chain in range(chains)
+        ]
+        self._done, self._kept = 0, []
+
+    def advance(self, draws: int, *, stop_if_diverging: bool = False) -> None:
+        """Draw so many more from each chain, after its warm-up.
+
+        Args:
+            draws: their number.
+            stop_if_diverging: stop after the first stretch with a divergence.
+        """
+        warmup, total = self._warmup, max(self._done, self._warmup) + draws
+        while self._done < total:
+            # Stretches end with the warm-up, so that all but the last ones are alike.
+            left = (warmup if self._done < warmup else total) - self._done
+            size = {"warmup": warmup, "length": min(_STRETCH, left)}
+            each = [
+                _advance(*self._arguments, state, self._target, **size)
+                for state in self._states
+            ]
+            self._states = [state for state, _ in each]
+            kept = jax.device_get([kept for _, kept in each])
+            if self._done >= warmup:
+                self._kept.append([np.stack(part) for part in zip(*kept, strict=True)])
+            self._done += size["length"]
+            if self._progress is not None:
+                self._progress(self._done, total)
+            if stop_if_diverging and self.diverged:
+                return
+
+    @property
+    def diverged(self) -> bool:
+        """Whether a trajectory of the last stretch diverged."""
+        return bool(self._kept) and bool(self._kept[-1][_DIVERGING].any())
+
+    def draws(self) -> Draws:
+        """Return the draws so far, with their parameters by name."""
+        parts = zip(*self._kept, strict=True)
+        standard, *statistics = (np.concatenate(part, axis=1) for part in parts)
+        values = _constrain(*self._arguments, standard, self._seed)
+        named = {name: np.asarray(value) for name, value in values.items()}
+        return Draws(named, *statistics, target_acceptance=self._target)
 
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
@@ -98,16 +221,8 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
     def one(state, _):
         state = step(state)
-        kept = (
-            state.z,
-            state.energy,
-            state.potential_energy,
-            state.diverging,
-            state.num_steps,
-            state.accept_prob,
-            state.adapt_state.step_size,
-        )
-        return state, kept
+        kept = [getattr(state, name) for name in _KEPT]
+        return state, [*kept, state.adapt_state.step_size]
 
     state = jax.tree.unflatten(structure, leaves)
     state, kept = jax.lax.scan(one, state, length=length)
@@ -116,150 +231,14 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 @jit
 def _constrain(problem, whitening, standard, seed):
+    """Return parameters by name, members that were integrated out drawn again."""
     _, own = jax.random.split(jax.random.key(seed))
     keys = jax.random.split(own, standard.shape[:2])
 
     def one(drawn):
-        e, key = drawn
-        named = values_at(problem, whitening.position(e))
+        coordinates, key = drawn
+        named = values_at(problem, whitening.position(coordinates))
         return named | draw_members(problem, named, key)
 
     # One draw after the other: side by side members by the thousand fill the memory.
     return jax.vmap(partial(jax.lax.map, one))((standard, keys))
-
-
-def sample(
-    problem: Sampled,
-    whitening: Whitening,
-    seed: int,
-    *,
-    chains: int = 4,
-    warmup: int = 1000,
-    draws: int = 1000,
-    progress: Progress | None = None,
-) -> Draws:
-    """Draw from the posterior.
-
-    A run with divergent trajectories, or whose chains have not mixed, is thrown away
-    whole and repeated with shorter steps. One that needs only more draws goes on, up to
-    four times as long. What is returned is one run, with the faults that it still has.
-
-    Args:
-        problem: the inference problem.
-        whitening: coordinates from `laplace.fit`.
-        seed: the same one gives the same draws.
-        chains: independent chains, one after the other in each stretch.
-        warmup: iterations of adaptation per chain, discarded.
-        draws: iterations kept per chain, or a multiple of them.
-        progress: called after every stretch.
-    """
-    begin = partial(_Run, problem, whitening, seed, chains, warmup, progress)
-    # Over bends long steps diverge: they are not even tried.
-    *longer, shortest = TARGET_ACCEPTANCE[problem.bent :]
-    for target in longer:
-        run = begin(target)
-        run.advance(draws, in_vain_if_diverging=True)
-        if _sound(run.kept()):
-            found = _gone_on(run, draws)
-            if not found.diverging.any():
-                return found
-    run = begin(shortest)
-    run.advance(draws)
-    return _gone_on(run, draws)
-
-
-def _gone_on(run: "_Run", draws: int) -> Draws:
-    """Return the draws of a run, which goes on by so many while that mends it."""
-    found = run.found()
-    while found.energy.shape[1] < _LONGEST * draws and _too_few(found):
-        run.advance(draws)
-        found = run.found()
-    return found
-
-
-def _too_few(found: Draws) -> bool:
-    """Tell whether more draws would mend a run, of ordinary length at least."""
-    draws = found.energy.shape[1]
-    if draws < _TELLING * ESS_PER_CHAIN or found.diverging.any():
-        return False
-    named = found.values.items()
-    return not have_mixed({n: v for n, v in named if v.ndim == 2 and np.ptp(v) > 0.0})
-
-
-def _sound(kept) -> bool:
-    """Tell whether shorter steps would mend nothing."""
-    standard, diverging = kept[0], kept[_DIVERGING]
-    if diverging.any():
-        return False
-    # So few draws are no sign of the steps.
-    few = standard.shape[1] < _TELLING * ESS_PER_CHAIN
-    coordinates = np.moveaxis(standard, -1, 0)
-    return few or have_mixed({str(i): x for i, x in enumerate(coordinates)})
-
-
-class _Run:
-    """All chains of one step size, which may go on."""
-
-    def __init__(self, problem, whitening, seed, chains, warmup, progress, target):
-        # Once, not at each stretch.
-        self._model = jax.device_put((problem, whitening))
-        self._seed = seed
-        self._warmup, self._progress, self._target = warmup, progress, target
-        size = {"warmup": warmup, "chains": chains}
-        self._states = [
-            _start(*self._model, seed, chain, target, **size) for chain in range(chains)
-        ]
-        self._done, self._kept = 0, []
-
-    def advance(self, draws: int, *, in_vain_if_diverging: bool = False) -> None:
-        """Draw so many more from each chain, after its warm-up.
-
-        Args:
-            draws: their number.
-            in_vain_if_diverging: stop at the first trajectory that diverges.
-        """
-        warmup, total = self._warmup, max(self._done, self._warmup) + draws
-        while self._done < total:
-            # Stretches end with the warm-up, so that all but the last ones are alike.
-            left = (warmup if self._done < warmup else total) - self._done
-            size = {"warmup": warmup, "length": min(_STRETCH, left)}
-            each = [
-                _advance(*self._model, state, self._target, **size)
-                for state in self._states
-            ]
-            self._states = [state for state, _ in each]
-            kept = jax.device_get([kept for _, kept in each])
-            if self._done >= warmup:
-                self._kept.append([np.stack(part) for part in zip(*kept, strict=True)])
-            self._done += size["length"]
-            if self._progress is not None:
-                self._progress(self._done, total)
-            if in_vain_if_diverging and self._diverged():
-                return
-
-    def _diverged(self) -> bool:
-        return bool(self._kept) and self._kept[-1][_DIVERGING].any()
-
-    def kept(self) -> list[np.ndarray]:
-        """Return what is kept of each draw, axes chain and draw first."""
-        parts = zip(*self._kept, strict=True)
-        return [np.concatenate(part, axis=1) for part in parts]
-
-    def found(self) -> Draws:
-        """Return the draws so far, with their parameters by name."""
-        standard, *about = self.kept()
-        values = _constrain(*self._model, standard, self._seed)
-        named = {name: np.asarray(value) for name, value in values.items()}
-        return Draws(named, *about, target_acceptance=self._target)
-
-
-def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
-    """Check that a run is long enough for its own checks, and not endless.
-
-    Raises:
-        InputError: it is not.
-    """
-    given = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
-    with Findings() as wrong:
-        for name, value in given.items():
-            wrong += implausible(name, value)

@@ -1,4 +1,4 @@
-"""What samplers can take: a problem with priors and a declared density."""
+"""The interface of what is sampled: priors and a declared density."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -22,7 +22,7 @@ class Sampled(eqx.Module):
         priors: dict[str, Prior]
 
     @property
-    def bent(self) -> bool:
+    def non_smooth(self) -> bool:
         """Whether its density has bends, at which the gradient jumps."""
         return False
 

@@ -1,7 +1,7 @@
-"""Noise whose neighbours within a run err alike: autoregressive of first order.
+"""Correlated noise within a run: autoregressive of first order.
 
 In noise sds e, z₁ = e₁ and zₜ = (eₜ − ρ eₜ₋₁) / √(1 − ρ²) are independent and of unit
-variance, whatever else is linear in the rows is whitened alike, and
+variance. What is linear in the rows is whitened in the same way, and
 log |dz/de| = −½ m log(1 − ρ²) with m the rows that follow another one.
 """
 
@@ -33,18 +33,18 @@ def whiten(columns, before, correlation):
     """Return columns of rows in which the noise is independent.
 
     Args:
-        columns: in noise sds, rows along the first axis; NumPy's or JAX' own.
+        columns: in noise sds, rows along the first axis; arrays of NumPy or JAX.
         before: from `previous_rows`.
         correlation: ρ, between −1 and 1.
     """
     follows = (before >= 0).reshape(-1, *(1,) * (columns.ndim - 1))
     gain = (1.0 - correlation**2) ** -0.5
-    own = 1.0 + (gain - 1.0) * follows
-    return own * columns - (correlation * gain) * follows * columns[before]
+    scale = 1.0 + (gain - 1.0) * follows
+    return scale * columns - (correlation * gain) * follows * columns[before]
 
 
 def worth(rows: int, correlation: float) -> float:
-    """Return as how many independent readings those of one run tell about a mean.
+    """Return the number of independent readings that determine a mean as well.
 
     1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|.
 
@@ -56,9 +56,11 @@ def worth(rows: int, correlation: float) -> float:
 
 
 def log_volume(following, correlation) -> Float[Array, "*r"]:
-    """Return log |de/dz| at each ρ, of as many rows as follow another one.
+    """Return log |de/dz| at each ρ, by NumPy where that is no array of JAX.
 
-    In NumPy of what is no array of JAX: nothing is compiled.
+    Args:
+        following: number of rows that follow another one.
+        correlation: ρ.
     """
     xp = jnp if isinstance(correlation, jax.Array) else np
     return 0.5 * following * xp.log1p(-(correlation**2))

@@ -62,12 +62,16 @@ def robust_line(records: Records) -> RobustLine | None:
     return RobustLine(float(found.x[0]) / span, half / span)
 
 
-def line_check(records: Records, stiffness: np.ndarray) -> Check:
+def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> Check:
     """Fail a stiffness that is far from a robust straight line without a reason.
+
+    And that of a part without sizes, of which only the readings tell the stiffness,
+    where they do not tell its sign.
 
     Args:
         records: the rows.
         stiffness: draws of the stiffness as read [N/mm], of a model without effects.
+        sized: whether a theory tells the stiffness from the sizes of the part.
     """
     name, line = "the stiffness is that of a straight line", robust_line(records)
     if line is None:
@@ -80,6 +84,7 @@ def line_check(records: Records, stiffness: np.ndarray) -> Check:
         f"the model has {middle:.4g} N/mm ({low:.4g} to {high:.4g}), a robust straight "
         f"line through the same readings {line.slope:.4g} ± {line.half_width:.2g} N/mm"
     )
+    near = near and (sized or line.slope > line.half_width)
     if not near:
         words += ". Look at the readings with `hdcal check`; choose a part of them"
     return Check(name, "passed" if near else "failed", words)

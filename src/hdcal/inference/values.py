@@ -1,4 +1,4 @@
-"""The parameters of one draw, and what they say of each row."""
+"""Mean and noise of each row, from the parameters of one draw."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,29 +8,22 @@ from jaxtyping import Float
 
 from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
-from hdcal.inference import compress
+from hdcal.inference.compression import CompressedRows
 from hdcal.inference.gauges import as_read
-from hdcal.inference.member_counts import member_counts
+from hdcal.inference.members import MEMBER_SD, MEMBERS, member_counts
 from hdcal.inference.problem import Problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.structure import ModelStructure
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
-# Float scalars and arrays by site name; what each one is depends on the name.
+# Float scalars and arrays by site name.
 Values = Mapping[str, Any]
 
-MEMBERS = {
-    "run": "run_offset",
-    "specimen": "specimen_deviation",
-    "discrepancy": "gap_weights",
-}
-# The site of the spread of those that are labels in the data.
-MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
-# Least noise sd that rounded readings can tell from none, in steps; twice as much noise
-# is raised by 5e-4 of it.
+# Least noise sd that rounded readings distinguish from none, in steps; twice as much
+# noise is raised by 5e-4 of it.
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
@@ -128,7 +121,7 @@ def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
     """Add Sheppard's variance of the rounding to the noise.
 
     Where rounding has its exact likelihood, the noise is at least what such readings
-    can tell from none: without any the likelihood has walls that no sampler passes.
+    distinguish from none: without any the likelihood has walls that no sampler passes.
     The smooth maximum leaves larger noise as it is, for what is predicted from it.
     """
     if not rounded:
@@ -139,7 +132,7 @@ def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
 
 
 def block_coefficients(
-    problem: Problem, blocks: compress.CompressedRows, values: Values
+    problem: Problem, blocks: CompressedRows, values: Values
 ) -> Float[Array, "g p"]:
     """Return the coefficients of each block, those of the discrepancy zero."""
     base = member_base(problem, values, blocks.run, blocks.specimen)

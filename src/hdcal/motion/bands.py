@@ -7,8 +7,8 @@ import jax
 import numpy as np
 
 from hdcal.exported import jit
-from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_problem import DynamicProblem, predict_states, stretch
 from hdcal.report.intervals import INTERVAL
 
 # Draws from which the bands of a record are made.

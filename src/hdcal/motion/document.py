@@ -1,7 +1,7 @@
 """A dynamic calibration in words: the only place of its sentences."""
 
-from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.motion.answer import DynamicCalibrationAnswer, Loss
+from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.motion.quantities import QUANTITIES, quantity_table
 from hdcal.report.document import (
     Document,

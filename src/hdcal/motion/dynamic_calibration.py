@@ -11,19 +11,24 @@ from hdcal.data.case import Case, Theory, require_case
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
 from hdcal.inference import laplace
-from hdcal.inference.assembly import Specifics, assemble, run_settings
+from hdcal.inference.assembly import (
+    MOST_LOG_LIKELIHOODS,
+    TOTAL,
+    Specifics,
+    assemble,
+    run_settings,
+)
 from hdcal.inference.checks import Check
 from hdcal.inference.density import densities
-from hdcal.inference.dynamic_posterior import LOSS, DynamicPosterior
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
 from hdcal.inference.sample import (
     Draws,
     Progress,
     check_settings,
     sample,
 )
+from hdcal.motion.dynamic_posterior import LOSS, DynamicPosterior
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import DynamicProblem, build_dynamic, pointwise
 from hdcal.motion.frequency_scan import scan
 from hdcal.motion.friction_search import motion_slopes
 from hdcal.motion.loss import (
@@ -111,7 +116,7 @@ def _specifics(
     mixed = [name for name in _DERIVED if name != "damping" or not undamped]
     return Specifics(
         log_likelihood=_log_likelihood(problem, found),
-        slopes=_slopes_in_sds(problem, found),
+        sensitivities=_slopes_in_sds(problem, found),
         mixed={name: found.values[name] for name in mixed},
         checks=[
             *checks,

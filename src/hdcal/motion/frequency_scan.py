@@ -12,8 +12,8 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.exported import jit
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.inference.padding import measured
+from hdcal.motion.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 _RATIOS = np.array([0.005, 0.03, 0.2])

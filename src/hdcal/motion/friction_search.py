@@ -14,10 +14,10 @@ import numpy as np
 from hdcal.data.prior import Prior
 from hdcal.exported import jit
 from hdcal.inference import laplace
-from hdcal.inference.amplitude_units import finest
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_priors import FRICTION
-from hdcal.inference.dynamic_problem import (
+from hdcal.inference.identifiability import standard_error
+from hdcal.motion.dynamic_priors import FRICTION
+from hdcal.motion.dynamic_problem import (
     STOP,
     DynamicProblem,
     predict_motion,
@@ -209,5 +209,5 @@ def _resolved(problem: DynamicProblem, values) -> DynamicProblem:
     columns = np.stack(list(slopes.values()), axis=1)
     columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
     noise = float(values["deformation_sigma"])
-    unit = finest(column, columns, noise, widest)
+    unit = standard_error(column, columns, noise, widest)
     return replace(problem, units={FRICTION: unit})

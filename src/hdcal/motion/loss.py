@@ -16,8 +16,8 @@ from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
-from hdcal.inference.dynamic_priors import dynamic_site_priors
-from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
+from hdcal.motion.dynamic_priors import dynamic_site_priors
+from hdcal.motion.dynamic_problem import DynamicProblem, build_dynamic
 from hdcal.motion.friction_search import (
     FrictionSearch,
     predict,

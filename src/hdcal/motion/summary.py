@@ -6,8 +6,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_priors import FRICTION
 from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.motion.answer import DynamicCalibrationAnswer, Loss
 from hdcal.motion.bands import MotionBands, motion_bands
@@ -17,6 +15,8 @@ from hdcal.motion.document import (
     motion_document,
     next_steps,
 )
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_priors import FRICTION
 from hdcal.motion.friction_search import dry_share, swing
 from hdcal.motion.loss import LEFT_OVER, LOOKED, WHITENESS
 from hdcal.report.intervals import Interval, credible_interval

@@ -1,6 +1,8 @@
 """Branches of the curve of a run: loading and unloading, and its straight part."""
 
+import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +13,9 @@ from hdcal.screening.turning_points import turning_points
 
 # Rows from which on a line has a slope and scatter.
 _FEWEST = 5
-# A movement over this share of the range is a branch.
-_BRANCH = 0.1
+# A movement over this share of the range is a branch; from so many on they are cycles,
+# of which so many are looked at.
+_BRANCH, _CYCLES, _MOST_MOVEMENTS = 0.1, 3, 12
 
 
 def name_segments(one: Run) -> None:
@@ -31,23 +34,37 @@ def name_segments(one: Run) -> None:
 
 
 def straight_part(one: Run, n: int) -> StraightPart | None:
-    """Return the longest straight part of a run's largest movement."""
-    rows = np.flatnonzero(one.kept)
+    """Return the longest straight part of a run's largest movement.
+
+    Of cycles it is the largest movement that is straight as a whole, where at least
+    half of them are: one that yields once goes back and forth along another line. In
+    a loop none is straight, and the stiffness is that of all of it. Rows that only
+    repeat a reading add nothing to what is known.
+    """
+    rows = one.distinct()
     if rows.size < _FEWEST:
         return None
     turns, _ = _branches(one, rows)
-    ends = [0, *turns.tolist(), rows.size - 1]
-    first = int(np.argmax(np.abs(np.diff(one.y[rows[ends]]))))
-    loading = rows[ends[first] : ends[first + 1] + 1]
-    found = longest_straight(one.x[loading], one.y[loading], one.scatter)
-    part = loading[found[0]]
+    ends = np.r_[0, turns, rows.size - 1]
+    largest = np.argsort(-np.abs(np.diff(one.y[rows[ends]])), kind="stable")
+    branches = [rows[ends[i] : ends[i + 1] + 1] for i in largest[:_MOST_MOVEMENTS]]
+    found = [longest_straight(one.x[b], one.y[b], one.scatter) for b in branches]
+    pairs = list(zip(branches, found, strict=True))
+    if largest.size >= _CYCLES:
+        pairs = [(b, s) for b, s in pairs if s.whole and b.size >= _SHOWN]
+        if 2 * len(pairs) < len(branches):
+            return None
+    branch, straight = pairs[0]
+    part = branch[straight.rows]
     if not np.ptp(one.x[part]):
         return None
     low, high = float(one.x[part].min()), float(one.x[part].max())
     inside = np.zeros(n, bool)
-    inside[one.rows[one.kept & (one.x >= low) & (one.x <= high)]] = True
+    inside[one.rows[one.with_repeats(part)]] = True
     slope, sd = _line(one.x[part], one.y[part], one.scatter)
-    return StraightPart(low, high, inside, slope, sd, found[1])
+    sd *= math.sqrt(straight.inflation)
+    whole = all(each.whole for each in found)
+    return StraightPart(low, high, inside, slope, sd, whole)
 
 
 def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:
@@ -78,21 +95,41 @@ def _line(x: np.ndarray, y: np.ndarray, scatter: float) -> tuple[float, float]:
     return slope, float(sd)
 
 
+# Rows of a movement from which on it is seen whether it is straight.
+_SHOWN = 20
 # The curve is cut into straight pieces between this many points, means of rows.
 _POINTS = 120
 _PIECES = 6
-# A piece has at least this many points, so that it has a slope and scatter.
+# A piece within the curve has at least this many points, so that it has a slope and
+# scatter; the first and the last may be shorter, as a preload or a tare is.
 _FEWEST_POINTS = 4
 # Scatter of a mean, as a share of the distance of two of them.
 _FINE = 0.1
 # Price of one more piece: a slope, a level and a place.
 _PARAMETERS = 3.0
+# Share of a piece that is left out where it meets another one: the place of a cut is
+# known to some points only, and a curve that bends gradually has none.
+_MARGIN = 0.1
+# Points from which on noise that remembers can be told from a kink: ten for each piece.
+_FEWEST_FOR_MEMORY = 10 * _PIECES
 
 
-def longest_straight(
-    x: np.ndarray, y: np.ndarray, scatter: float = 0.0
-) -> tuple[slice, bool]:
-    """Return the rows of the longest straight part, and whether it is the whole curve.
+class Straight(NamedTuple):
+    """The longest straight part of a movement.
+
+    Attributes:
+        rows: of the movement.
+        whole: whether it is the whole curve.
+        inflation: of the variance of its slope, by the correlation of neighbours.
+    """
+
+    rows: slice
+    whole: bool
+    inflation: float = 1.0
+
+
+def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Straight:
+    """Return the longest straight part of a movement.
 
     The curve is cut into straight pieces, as many as the Bayesian information
     criterion pays for. The longest one covers the largest area of force and
@@ -109,22 +146,25 @@ def longest_straight(
         fine = _FINE * float(np.ptp(x)) * np.sqrt(x.size) / scatter
         points = min(points, int(fine ** (2.0 / 3.0)))
     if points < 2 * _FEWEST_POINTS:
-        return slice(0, x.size), True
+        return Straight(slice(0, x.size), True)
     edges = np.linspace(0, x.size, points + 1).astype(int)
     size = np.diff(edges)
     px, py = (np.add.reduceat(values, edges[:-1]) / size for values in (x, y))
-    cost = _costs(px - px.mean(), py - py.mean())
-    cuts = _pieces(cost, px.size)
     span_x, span_y = np.ptp(px), np.ptp(py)
     if not span_x or not span_y:
-        return slice(0, x.size), True
+        return Straight(slice(0, x.size), True)
+    cuts, inflation = _pieces(px - px.mean(), py - py.mean())
     areas = [
         abs((px[b - 1] - px[a]) / span_x) * abs((py[b - 1] - py[a]) / span_y)
         for a, b in pairwise(cuts)
     ]
     best = int(np.argmax(areas))
-    rows = slice(int(edges[cuts[best]]), int(edges[cuts[best + 1]]))
-    return rows, len(cuts) == 2
+    first, last = int(edges[cuts[best]]), int(edges[cuts[best + 1]])
+    margin = int(_MARGIN * (last - first))
+    inner = slice(
+        first + (margin if first > 0 else 0), last - (margin if last < x.size else 0)
+    )
+    return Straight(inner, len(cuts) == 2, inflation)
 
 
 def _costs(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -136,11 +176,16 @@ def _costs(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         xx, xy, yy = sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n
         left = yy - np.where(xx > 0.0, xy * xy / xx, 0.0)
     short = n < _FEWEST_POINTS
+    short[0, 1:], short[1:-1, -1] = False, n[1:-1, -1] < 1
     return np.where(short, np.inf, np.maximum(left, 0.0))
 
 
-def _pieces(cost: np.ndarray, points: int) -> list[int]:
-    """Return the edges of the pieces."""
+def _pieces(x: np.ndarray, y: np.ndarray) -> tuple[list[int], float]:
+    """Return the edges of the pieces, and how much correlation widens variances.
+
+    What the most pieces leave is noise; neighbours that err alike count for less.
+    """
+    cost, points = _costs(x, y), x.size
     best = np.full((_PIECES + 1, points + 1), np.inf)
     came = np.zeros((_PIECES + 1, points + 1), int)
     best[0, 0] = 0.0
@@ -148,14 +193,41 @@ def _pieces(cost: np.ndarray, points: int) -> list[int]:
         total = best[piece - 1][:, None] + cost
         came[piece] = np.argmin(total, axis=0)
         best[piece] = np.min(total, axis=0)
+    inflation = _inflation(x, y, _edges(came, points, _PIECES))
     left = best[1:, points]
     floor = 1e-8 * cost[0, points] + 1e-300  # digits of the readings
-    criterion = points * np.log(np.maximum(left, floor) / points)
+    worth = points / inflation
+    criterion = worth * np.log(np.maximum(left, floor) / points)
     paid = _PARAMETERS * np.arange(1, _PIECES + 1)
     # dearer where few points are left to tell the noise
     criterion += paid * np.log(points) * points / np.maximum(points - paid - 1.0, 1.0)
-    count = int(np.argmin(criterion)) + 1
+    return _edges(came, points, int(np.argmin(criterion)) + 1), inflation
+
+
+def _edges(came: np.ndarray, points: int, count: int) -> list[int]:
+    """Return the edges of so many pieces, from where each best one began."""
     edges = [points]
     for piece in range(count, 0, -1):
         edges.append(int(came[piece, edges[-1]]))
     return edges[::-1]
+
+
+def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int]) -> float:
+    """Return (1 + r) / (1 - r) of the neighbours' correlation r, if it is positive."""
+    if x.size < _FEWEST_FOR_MEMORY:
+        return 1.0
+    pieces = [(a, b) for a, b in pairwise(edges) if b > a]
+    left = np.concatenate([_left(x[a:b], y[a:b]) for a, b in pieces])
+    square = float(left @ left)
+    r = float(left[1:] @ left[:-1]) / square if square else 0.0
+    # Two parameters a piece make the residuals of independent noise alternate.
+    r += 2.0 * _PIECES / x.size
+    r = min(max(r, 0.0), 1.0 - 1.0 / x.size)
+    return (1.0 + r) / (1.0 - r)
+
+
+def _left(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return what a line leaves of some points."""
+    x, y = x - x.mean(), y - y.mean()
+    square = float(x @ x)
+    return y - x * (float(x @ y) / square) if square else y

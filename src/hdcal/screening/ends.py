@@ -63,9 +63,11 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
     usual = Usual.of(step, resolution(y))
     found = usual.surprised(step, x.size) & (rows >= 2) & (rows <= last)
     found &= np.abs(step) > _LEAST * spread(y)
-    # at rest, or a gauge that is zeroed, by far more than it ever moves
-    far = _ZEROED * float(quantile(np.abs(run), 0.95))
-    found &= (np.abs(run) <= _REST * spread(x)) | (np.abs(run) > far)
+    # moved by no more than a usual step, or a gauge that is zeroed, by far more
+    usual_step = float(quantile(np.abs(run), 0.95))
+    far = _ZEROED * usual_step
+    near = max(_REST * spread(x), usual_step)
+    found &= (np.abs(run) <= near) | (np.abs(run) > far)
     for place in np.flatnonzero(found)[::-1]:
         row = rows[place]
         rests = np.ptp(x[:row]) <= _REST * spread(x)

@@ -73,15 +73,15 @@ class Observation:
 
 @dataclass(frozen=True)
 class StraightPart:
-    """The longest straight part of the first loading.
+    """The longest straight part of the largest movement of a run.
 
     Attributes:
         low: smallest deformation of it, as read [mm].
         high: largest deformation of it, as read [mm].
-        rows: whether a row lies in this range of the deformation, shape (n,).
+        rows: which rows it has, shape (n,); other branches have none of them.
         slope: of the force over the deformation there, by least squares [N/mm].
         slope_sd: its standard error [N/mm].
-        whole: whether the whole curve is straight.
+        whole: whether every movement of the run is straight.
     """
 
     low: float
@@ -106,7 +106,8 @@ class Screening:
         zero: counts the jumps of a zero before each row in its run, shape (n,).
         deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
         trembling: whether that scatter hides the direction of the movement.
-        straight: the longest straight part of the first run, None where too few rows.
+        straight: the longest straight part of a single run; None of several ones, and
+            where too few rows are left.
         working_range: in words; empty where none is stated.
     """
 

@@ -81,7 +81,7 @@ def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
         columns["zero"].astype(int),
         scatter,
         10.0 * scatter > HIDDEN * span,
-        straight_part(runs[0], n) if runs else None,
+        straight_part(runs[0], n) if len(runs) == 1 else None,
     )
 
 

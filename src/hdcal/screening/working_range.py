@@ -10,7 +10,11 @@ import numpy as np
 from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
-FORM = "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force; or all"
+FORM = (
+    "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force; or straight, for "
+    "the longest straight part; or all"
+)
+STRAIGHT = "straight"
 
 
 @dataclass(frozen=True)
@@ -20,17 +24,18 @@ class WorkingRange:
     Attributes:
         low: lower end.
         high: upper end.
-        unit: mm of the deformation as read, or % of the largest force of a run.
+        unit: mm of the deformation as read, or % of the largest force of a run; or
+            `straight` where the longest straight part sets the ends.
     """
 
     low: float
     high: float
-    unit: Literal["mm", "%"]
+    unit: Literal["mm", "%", "straight"]
 
     def __str__(self) -> str:
         if math.isinf(self.high):
             return "all of the curve"
-        if self.unit == "mm":
+        if self.unit != "%":
             return f"{self.low:g} to {self.high:g} mm"
         return f"{self.low:g} to {self.high:g} % of the largest force"
 
@@ -49,13 +54,14 @@ class WorkingRange:
 
 
 def read_range(text: str) -> WorkingRange:
-    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force, or `all`.
+    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force, `straight` or `all`.
 
     Raises:
         ValueError: it is neither; the words say why.
     """
-    if text.strip() == "all":
-        return WorkingRange(-math.inf, math.inf, "mm")
+    if text.strip() in ("all", STRAIGHT):
+        unit = "mm" if text.strip() == "all" else STRAIGHT
+        return WorkingRange(-math.inf, math.inf, unit)
     found = _ENDS.fullmatch(text)
     try:
         assert found is not None
@@ -81,10 +87,15 @@ def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Scr
         wanted: the range.
         run: index of each row's run, shape (n,).
     """
-    inside = np.zeros(run.size, bool)
-    for index in np.unique(run):
-        rows = np.flatnonzero((run == index) & screening.kept)
-        inside[rows] = wanted.inside(screening.deformation[rows], screening.force[rows])
+    part = screening.straight
+    if wanted.unit == STRAIGHT and part is not None:
+        wanted, inside = replace(wanted, low=part.low, high=part.high), part.rows
+    else:
+        inside = np.zeros(run.size, bool)
+        for index in np.unique(run):
+            rows = np.flatnonzero((run == index) & screening.kept)
+            x, y = screening.deformation[rows], screening.force[rows]
+            inside[rows] = wanted.inside(x, y)
     outside = np.flatnonzero(screening.kept & ~inside)
     if not outside.size:
         return replace(screening, working_range=str(wanted))

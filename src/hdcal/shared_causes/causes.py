@@ -21,7 +21,7 @@ from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check, mixing_checks
-from hdcal.inference.mixing import have_mixed, mixing
+from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect

@@ -1,6 +1,6 @@
 """Chart of the readings of a case, with the segments of the record in colour."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -29,6 +29,7 @@ _COLOURS = dict(
         strict=True,
     )
 )
+ALL = range(len(SEGMENTS))
 
 
 def readings_chart(case: Case) -> Chart:
@@ -42,7 +43,7 @@ def readings_chart(case: Case) -> Chart:
     panel = Panel(
         x=f"deformation as read ({case.gear.reading}) [mm]",
         y="force as read [N]",
-        marks=[*marks, *([] if found is None else _left_out(found))],
+        marks=[*marks, *([] if found is None else left_out(found))],
         title=f"{case.name}: readings",
     )
     return Chart(panels=[panel])
@@ -73,8 +74,15 @@ def _kept(found: Screening) -> Iterator[Points]:
     yield from _segments(found, found.kept, "o", "")
 
 
-def _left_out(found: Screening) -> Iterator[Points]:
-    yield from _segments(found, ~found.kept, "X", "left out: ")
+def left_out(found: Screening, segments: Iterable[int] = ALL) -> Iterator[Points]:
+    """Yield the rows that were left out, as crosses.
+
+    Args:
+        found: the screening.
+        segments: of which rows are drawn.
+    """
+    rows = ~found.kept & np.isin(found.segment, [*segments])
+    yield from _segments(found, rows, "X", "left out: ")
 
 
 def _segments(

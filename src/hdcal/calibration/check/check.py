@@ -8,7 +8,7 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
 from hdcal.calibration.check.screened import Screened, StraightRange, screened
-from hdcal.calibration.straight_part import straight_range
+from hdcal.calibration.straight_part import takes_straight_part
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_file.schema import certificates_in
@@ -136,15 +136,13 @@ class Check(Result):
 
     @property
     def straight_part(self) -> StraightRange | None:
-        """The longest straight part; of several specimens none is told."""
-        if self.screening is None or len(self.data.specimens) > 1:
-            return None
-        return self.screening.straight_part
+        """The longest straight part of a single run."""
+        return self.screening.straight_part if self.screening else None
 
     @property
     def takes_part(self) -> bool:
         """Whether `calibrate` takes the longest straight part only."""
-        return straight_range(self.case) is not None
+        return takes_straight_part(self.case)
 
     @property
     def stiffness_range(self) -> float:

@@ -8,7 +8,13 @@ from hdcal.errors import Finding, InputError
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
 from hdcal.screening.words import HIDDEN_DIRECTION, in_words, question
-from hdcal.screening.working_range import FORM, WorkingRange, in_range, read_range
+from hdcal.screening.working_range import (
+    FORM,
+    STRAIGHT,
+    WorkingRange,
+    in_range,
+    read_range,
+)
 
 # Findings that are spelled out.
 _LISTED = 50
@@ -63,6 +69,9 @@ def screened(
         offers = [offer(bad, many if whole else None)] if offered else []
         raise InputError([*bad.values(), *offers])
     if wanted is not None:
+        if wanted.unit == STRAIGHT and found.straight is None:
+            words = "is straight, and the data are no single run with a straight part"
+            raise InputError([Finding("range", words, FORM)])
         found = in_range(found, wanted, run)
     words = [in_words(one, rows, found.working_range) for one in found.observations]
     found = replace(found, observations=tuple(words))

@@ -50,7 +50,8 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     with console.wrong:
         console.reserve_folder(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
-    from hdcal.inference.model_average import load_any
+    from hdcal.inference.model_average import load_models
+    from hdcal.motion.dynamic_posterior import DynamicPosterior
     from hdcal.motion.respond.respond import respond as ask
     from hdcal.motion.respond.summary import response_report, with_columns
     from hdcal.report.write import write_report
@@ -58,7 +59,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     if asked["mass"] is not None:
         asked["mass"] *= 1e-3  # 1 kg = 1e-3 N·s²/mm
     given = {name: value for name, value in asked.items() if value is not None}
-    response = ask(load_any(run), drive, **given)
+    response = ask(load_models(run, [DynamicPosterior]), drive, **given)
     report = response_report(response, console.command)
     assert console.folder is not None
     write_report(report, console.folder)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
+from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.motion.quantities import quantity_table
 from hdcal.motion.respond.answer import QuantityEstimate, ResponseAnswer
 from hdcal.prediction.engine.causes import averaging_words

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
+from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
 from hdcal.prediction.engine.pooled import Pooled
 

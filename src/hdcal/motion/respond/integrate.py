@@ -11,11 +11,11 @@ import numpy as np
 
 from hdcal.exported import jit
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, case_reading
 from hdcal.inference.values import Values
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_priors import mass_prior
 from hdcal.motion.respond.request import Request
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.dynamics import (

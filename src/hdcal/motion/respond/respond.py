@@ -13,9 +13,9 @@ import numpy as np
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.exported import jit
+from hdcal.inference.members import MEMBERS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
-from hdcal.inference.values import MEMBERS
 from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.motion.respond.answer import (
     QuantityEstimate,
     ResponseAnswer,

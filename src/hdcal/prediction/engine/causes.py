@@ -11,7 +11,6 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.posterior_tree import group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.models import Models, model_pairs
@@ -47,10 +46,7 @@ class Cause:
     @cached_property
     def whitening(self) -> laplace.Whitening:
         """Mode of its density and curvature there."""
-        if laplace.GROUP not in self.posterior.tree:
-            return laplace.fit(self.problem)
-        kept = group_of(self.posterior.tree, laplace.GROUP)
-        return laplace.from_group(self.problem, kept)
+        return laplace.fit(self.problem)
 
     @property
     def size(self) -> int:

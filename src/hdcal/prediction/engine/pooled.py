@@ -14,7 +14,6 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.theory_names import Theory
-from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior_tree import group_of
 from hdcal.inference.problem import Problem, build_problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
@@ -58,7 +57,7 @@ class Pooled:
     @property
     def moving(self) -> bool:
         """Whether the gear was calibrated in motion."""
-        return isinstance(self.causes[0].posterior, DynamicPosterior)
+        return self.causes[0].posterior.kind == "dynamic"
 
     @property
     def with_gap(self) -> bool:

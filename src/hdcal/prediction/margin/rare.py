@@ -24,9 +24,9 @@ from scipy.optimize import minimize
 from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.inference import laplace
+from hdcal.inference.diagnostics import pareto_shape
 from hdcal.inference.distributions import distribution
-from hdcal.inference.integrated import gap_law
-from hdcal.inference.mixing import pareto_shape
+from hdcal.inference.marginal import gap_distribution
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
@@ -115,7 +115,7 @@ class _Target(eqx.Module):
         value |= {SCORES: scores[:2], PLACES: scores[2:], BENDS: sizes}
         free = 0.0
         if "discrepancy" in problem.integrated:
-            mean, root = gap_law(problem, value)
+            mean, root = gap_distribution(problem, value)
             row = jax.grad(partial(self._left, value))(mean) @ root
             # Not its root, which has no derivative where the leftover has no part.
             free = row @ row

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 from scipy.special import softmax
 
-from hdcal.inference.t_mixture import TMixture
+from hdcal.inference.importance import TMixture
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
 _FREE, _SPREAD = 5.0, 1.3

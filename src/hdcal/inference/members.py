@@ -1,4 +1,4 @@
-"""How many runs and specimens have a parameter of their own, and how many may."""
+"""Parameters that come in numbers: of runs, of specimens, weights of a discrepancy."""
 
 from collections.abc import Mapping
 
@@ -6,30 +6,36 @@ from hdcal.data.case import Case
 from hdcal.errors import Finding, InputError
 from hdcal.inference.discrepancy import leftover_size
 
-# Runs or specimens: of the kind that is eliminated one by one, and of any other, whose
-# cost grows with the cube of their number.
-_MOST_MEMBERS, _MOST_DENSE = 10_000, 500
+# Site of each kind, and the site of the spread of those that are labels in the data.
+MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "discrepancy": "gap_weights",
+}
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
+# Most runs or specimens: of the kind that is eliminated one by one, and of any other,
+# whose cost grows with the cube of their number.
+_MOST_ELIMINATED, _MOST_DENSE = 10_000, 500
 
 
 def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
-    """Return how many members of each kind have a parameter of their own.
+    """Return the number of members of each kind in the model.
 
     Args:
         case: records and labels.
         with_gap: whether there is a leftover discrepancy.
     """
     known = case.records.known
-    weights = leftover_size(case.records)
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "discrepancy": weights if with_gap else 0,
+        "discrepancy": leftover_size(case.records) if with_gap else 0,
     }
     return {kind: count for kind, count in counts.items() if count}
 
 
 def integrated_kinds(
-    counts: Mapping[str, int], linear: frozenset[str]
+    name: str, counts: Mapping[str, int], linear: frozenset[str]
 ) -> tuple[str, ...]:
     """Return the kinds of members to integrate out.
 
@@ -37,38 +43,23 @@ def integrated_kinds(
     specimens the more numerous kind.
 
     Args:
-        counts: from `member_counts`.
-        linear: kinds that enter a Gaussian likelihood linearly.
-    """
-    return tuple(
-        sorted(
-            counts.keys() & linear,
-            key=lambda kind: (kind == "discrepancy", -counts[kind], kind),
-        )
-    )
-
-
-def check_member_counts(
-    name: str, counts: Mapping[str, int], integrated: tuple[str, ...]
-) -> None:
-    """Check that runs and specimens are not too many.
-
-    Args:
         name: of the case.
         counts: from `member_counts`.
-        integrated: from `integrated_kinds`.
+        linear: kinds that enter a Gaussian likelihood linearly.
 
     Raises:
-        InputError: they are.
+        InputError: runs or specimens are too many.
     """
+    order = sorted(counts.keys() & linear, key=lambda kind: (-counts[kind], kind))
+    kinds = [kind for kind in order if kind != "discrepancy"]
     findings = []
     for kind in sorted(counts.keys() - {"discrepancy"}):
-        eliminated = kind in integrated[:1]
-        most = _MOST_MEMBERS if eliminated else _MOST_DENSE
+        most = _MOST_ELIMINATED if kind in kinds[:1] else _MOST_DENSE
         if counts[kind] > most:
             words = f"{counts[kind]} {kind}s are too many for one calibration"
-            if not eliminated:
+            if most == _MOST_DENSE:
                 words += " with effects, coarse readings or both runs and specimens"
             findings.append(Finding(name, words, f"give it {most} or fewer"))
     if findings:
         raise InputError(findings)
+    return (*kinds, *(kind for kind in order if kind == "discrepancy"))

@@ -1,4 +1,4 @@
-"""Independent proposals draw from the posterior, or say that they cannot."""
+"""Importance sampling draws from the posterior, or say that they cannot."""
 
 import jax
 import numpy as np
@@ -13,9 +13,9 @@ from hdcal.data.prior import Prior
 from hdcal.data.resources import datasets_folder
 from hdcal.fleets.fleet_problem import fleet_problem
 from hdcal.fleets.readings import fleet_readings
-from hdcal.inference import independence, laplace
-from hdcal.inference.independence import sample_independently
-from hdcal.inference.mixing import mixing
+from hdcal.inference import importance, laplace
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.importance import sample_by_importance
 from hdcal.inference.sample import sample
 from hdcal.inference.sampled_problem import Sampled
 
@@ -75,7 +75,7 @@ def _double():
 
 def drawn(problem, seed=0, chains=4, draws=800):
     whitening = laplace.fit(problem)
-    return sample_independently(problem, whitening, seed, chains=chains, draws=draws)
+    return sample_by_importance(problem, whitening, seed, chains=chains, draws=draws)
 
 
 def first_drawn(problem, **size):
@@ -92,13 +92,13 @@ def test_draws_are_of_a_skewed_law():
     assert stats.kstest(place - 2.0 * size, stats.norm.cdf).pvalue > 0.001
 
 
-def test_a_wrong_acceptance_would_be_seen(monkeypatch):
-    def everything(weight, rng):
-        return np.tile(np.arange(weight.shape[1]), (len(weight), 1))
+def test_wrong_weights_would_be_noticed(monkeypatch):
+    def equal(problem, whitening, proposals, place, progress=None):
+        noise = 1e-3 * np.random.default_rng(0).random(len(place))
+        return (1.0 + noise) / np.sum(1.0 + noise)
 
-    monkeypatch.setattr(independence, "_metropolis", everything)
-    found = first_drawn(Skew({}), draws=2000)
-    size = found.values["size"].ravel()
+    monkeypatch.setattr(importance, "_weights", equal)
+    size = first_drawn(Skew({}), draws=2000).values["size"].ravel()
     assert stats.kstest(size, stats.gamma(5.0).cdf).pvalue < 1e-6
 
 
@@ -117,15 +117,6 @@ def test_tails_heavier_than_any_proposal_are_drawn_right_or_not_at_all():
     assert drawn_at_all
     place = np.concatenate([found.values["place"][:, ::8] for found in drawn_at_all])
     assert stats.kstest(place.ravel(), stats.cauchy.cdf).pvalue > 0.001
-
-
-def test_a_chain_moves_by_the_ratio_of_weights():
-    # Two states of weights 1 and 3, proposed alike: a quarter of the time in the first.
-    rng = np.random.default_rng(0)
-    weight = np.log(rng.choice([1.0, 3.0], (4, 20_000)))
-    path = independence._metropolis(weight, rng)
-    share = np.mean(np.take_along_axis(weight, path, axis=1) == 0.0)
-    assert share == pytest.approx(0.25, abs=0.01)
 
 
 def quarter_off():
@@ -150,7 +141,7 @@ def test_a_fleet_is_what_nuts_has_it_whatever_the_seed(which):
     problem, _ = fleet_problem(fleet_readings(case))
     whitening = laplace.fit(problem, {"stiffness": 200.0})
     each = [
-        sample_independently(problem, whitening, seed, chains=4, draws=2000)
+        sample_by_importance(problem, whitening, seed, chains=4, draws=2000)
         for seed in range(6)
     ]
     drawn = [found.values for found in each if found is not None]

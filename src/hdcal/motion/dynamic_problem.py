@@ -19,7 +19,6 @@ from hdcal.data.records import Array
 from hdcal.data.theory_names import Theory
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
-from hdcal.inference.dynamic_priors import FRICTION, SITES
 from hdcal.inference.gauges import where_read, with_gains
 from hdcal.inference.model import sample_amplitude, sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
@@ -30,6 +29,7 @@ from hdcal.inference.problem import (
 )
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.values import Values
+from hdcal.motion.dynamic_priors import FRICTION, SITES
 from hdcal.physics.dynamics import natural_frequency
 from hdcal.physics.effect import Effect
 from hdcal.physics.frictional_response import frictional_response
@@ -80,7 +80,7 @@ class DynamicProblem(Sampled):
         numpyro.factor("deformation", log_likelihood(self, values))
 
     @property
-    def bent(self) -> bool:
+    def non_smooth(self) -> bool:
         """Whether its density has bends: with friction, where one more swing begins."""
         return bool(self.effects)
 

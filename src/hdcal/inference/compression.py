@@ -3,7 +3,7 @@
 Within one run, one specimen and one known sd the rows y ~ N(X c, σ²) say no more
 than the triangular factor of [X y] and their number:
 ‖y − X c‖² = ‖R (c, −1)‖².
-Where neighbours err alike, so do rows and the rows before them, kept side by side.
+Where neighbours are correlated, so do rows and the rows before them, kept side by side.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from hdcal.data.records import Array, Records
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import append_zeros, bucket_size, pad_records
-from hdcal.inference.serial_correlation import log_volume, previous_rows
+from hdcal.inference.serial_correlation import previous_rows
 
 # Up to this many rows of triangular factors cost little, whatever they replace.
 _MANY_FACTOR_ROWS = 10_000
@@ -34,7 +34,7 @@ class CompressedRows(eqx.Module):
         run: run index.
         specimen: specimen index.
         pairs: R of [X y X' y'] with X' and y' those of the row before, or None
-            where neighbours do not err alike.
+            where neighbours are not correlated.
         following: number of rows that follow another one [-].
     """
 
@@ -75,13 +75,57 @@ class CompressedRows(eqx.Module):
         return replace(self, factor=factor, pairs=None)
 
 
+def keep_or_compress(
+    records: Records,
+    base_columns: np.ndarray,
+    discrepancy: Discrepancy | None,
+    keep: bool,
+    correlated: bool,
+) -> dict[str, Any]:
+    """Return the fields of a problem that hold its rows, kept or compressed.
+
+    Args:
+        records: the measured rows.
+        base_columns: of the base model, shape (n, 4).
+        discrepancy: of the problem, or None.
+        keep: whether the rows must be kept.
+        correlated: whether neighbours within a run may be correlated.
+    """
+    padded, count = pad_records(records), len(records.force)
+    columns = discrepancy_columns(discrepancy, padded)
+    before = previous_rows(records) if correlated else None
+    design = base_columns
+    if columns is not None:
+        design = np.hstack([base_columns, columns[:count]])
+    blocks = None if keep else compress_if_smaller(records, design, before)
+    if blocks is not None:
+        kept = {"blocks": blocks, "records": None, "columns": None, "before": None}
+    else:
+        if before is not None:
+            padding = (0, len(padded.force) - count)
+            before = np.pad(before, padding, constant_values=-1)
+        kept = {"blocks": None, "records": padded, "columns": columns, "before": before}
+    return kept | {"count": count}
+
+
+def compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
+    """Return the rows compressed, or None where that would be no smaller."""
+    own = np.asarray(records.force_sd)
+    earlier = own if before is None else np.where(before < 0, own, own[before])
+    distinct, group = group_rows(records.run, records.specimen, own, earlier)
+    # One factor per row (an sd of its own in each) would be larger than the rows.
+    factor_rows = len(distinct) * (design.shape[1] + 1)
+    if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
+        return None
+    return compress(design, records.force, distinct, group, before)
+
+
 def group_rows(run, specimen, *known_sd) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct (run, specimen, sd, …) and the group of each row."""
     keys = [np.asarray(key, float) for key in (run, specimen, *known_sd)]
     if all((key == key[0]).all() for key in keys):
         return np.stack(keys, axis=1)[:1], np.zeros(len(keys[0]), dtype=int)
-    table = np.stack(keys, axis=1)
-    distinct, group = np.unique(table, axis=0, return_inverse=True)
+    distinct, group = np.unique(np.stack(keys, axis=1), axis=0, return_inverse=True)
     return distinct, group.reshape(-1)
 
 
@@ -94,21 +138,19 @@ def compress(columns, force, distinct, group, before=None) -> CompressedRows:
         distinct: run, specimen, known sd and that of the row before, of each group,
             shape (g, 4).
         group: group index of each row, shape (n,).
-        before: index of the row before each, −1 for none; None where neighbours do
-            not err alike.
+        before: index of the row before each, −1 for none; None where neighbours are
+            not correlated.
 
     Returns:
         The factors of each group. Where a stated sd tells rows apart, their number is
         any number: groups of no rows then fill up the bucket.
     """
     table, size = np.column_stack([columns, force]), len(distinct)
-    alone = np.full(len(group), before is None)
-    pairs, following = None, np.zeros(size)
+    alone, pairs = np.full(len(group), True), None
     if before is not None:
         alone = before < 0
         both = np.hstack([table[~alone], table[before[~alone]]])
         pairs = _factors(both, group[~alone], size)
-        following = np.bincount(group[~alone], minlength=size).astype(float)
     rows = CompressedRows(
         _factors(table[alone], group[alone], size),
         np.bincount(group, minlength=size).astype(float),
@@ -117,7 +159,7 @@ def compress(columns, force, distinct, group, before=None) -> CompressedRows:
         distinct[:, 0].astype(int),
         distinct[:, 1].astype(int),
         pairs,
-        following,
+        np.bincount(group[~alone], minlength=size).astype(float),
     )
     same_sd = (distinct[:, 2] == distinct[0, 2]).all()
     return rows if same_sd else append_zeros(rows, bucket_size(size))
@@ -133,75 +175,3 @@ def _factors(table: np.ndarray, group: np.ndarray, size: int) -> np.ndarray:
         factor = np.linalg.qr(rows, mode="r")
         factors[index, : len(factor)] = factor
     return factors
-
-
-def keep_or_compress(
-    records: Records,
-    base_columns,
-    discrepancy: Discrepancy | None,
-    keep: bool,
-    correlated: bool,
-) -> dict[str, Any]:
-    """Return the fields of a problem that hold its rows, kept or compressed.
-
-    Args:
-        records: the measured rows.
-        base_columns: of the base model, shape (n, 4).
-        discrepancy: of the problem, or None.
-        keep: whether the rows must be kept.
-        correlated: whether neighbours within a run may err alike.
-    """
-    padded, count = pad_records(records), len(records.force)
-    columns = discrepancy_columns(discrepancy, padded)
-    before = previous_rows(records) if correlated else None
-    kept: dict[str, Any] = dict.fromkeys(("records", "columns", "before", "blocks"))
-    if not keep:
-        own = [] if columns is None else [columns[:count]]
-        design = np.hstack([base_columns, *own])
-        kept["blocks"] = _compress_if_smaller(records, design, before)
-    if kept["blocks"] is None:
-        if before is not None:
-            padding = (0, len(padded.force) - count)
-            before = np.pad(before, padding, constant_values=-1)
-        kept |= {"records": padded, "columns": columns, "before": before}
-    return kept | {"count": count}
-
-
-def _compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
-    """Return the rows compressed, or None where that would be no smaller."""
-    own = np.asarray(records.force_sd)
-    earlier = own if before is None else np.where(before < 0, own, own[before])
-    distinct, group = group_rows(records.run, records.specimen, own, earlier)
-    # One factor per row (an sd of its own in each) would be larger than the rows.
-    factor_rows = len(distinct) * (design.shape[1] + 1)
-    if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
-        return None
-    return compress(design, records.force, distinct, group, before)
-
-
-def residual(
-    blocks: CompressedRows, coefficients: Float[Array, "g p"]
-) -> Float[Array, "g r"]:
-    """Return y − X c of each block in its rotated rows [N]."""
-    target = blocks.factor[..., -1]
-    fitted = jnp.einsum("gij,gj->gi", blocks.factor[..., :-1], coefficients)
-    return target - fitted
-
-
-def log_likelihood(
-    blocks: CompressedRows, coefficients: Float[Array, "g p"], sigma, step, correlation
-) -> Float[Array, ""]:
-    """Return the log likelihood of all rows of all blocks.
-
-    Args:
-        blocks: the compressed data, whitened.
-        coefficients: c of each block [N per column].
-        sigma: noise sd before rounding [N].
-        step: rounding step [N].
-        correlation: of neighbouring rows [-].
-    """
-    variance = blocks.variance(sigma, step)
-    squares = jnp.sum(residual(blocks, coefficients) ** 2, axis=-1)
-    return -0.5 * jnp.sum(
-        blocks.count * jnp.log(2.0 * jnp.pi * variance) + squares / variance
-    ) - log_volume(jnp.sum(blocks.following), correlation)

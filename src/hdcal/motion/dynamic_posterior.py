@@ -6,10 +6,10 @@ from typing import ClassVar
 
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
-from hdcal.inference.dynamic_priors import dynamic_sites
-from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.motion.dynamic_priors import dynamic_sites
+from hdcal.motion.dynamic_problem import DynamicProblem, build_dynamic
 
 # The setting with the probability of each model of the loss.
 LOSS = "loss"

@@ -1,0 +1,269 @@
+"""Sensitivities of the readings: standard errors, and what the prior decides."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import jax
+import numpy as np
+
+from hdcal.data.gear_file.certificates import GAUGE_UNITS
+from hdcal.data.records import Records
+from hdcal.exported import jit
+from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
+from hdcal.inference.distributions import frozen, moments
+from hdcal.inference.padding import pad_records
+from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.values import predict_rows
+from hdcal.physics.effect import parameters
+
+# Parameters of the mean besides those of effects; sigma is not one of them.
+_MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
+_MOST_MEMBERS = 200
+# A flat direction is named with the parameters that carry this part of it.
+_SHARE = 0.3
+# A parameter that moves the mean by fewer noise sds over its whole prior has no effect.
+_NO_EFFECT = 1e-3
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """The mean reading near one set of parameters, row by row.
+
+    Attributes:
+        sd: of the noise, rounding included [N], shape (n,).
+        slopes: derivatives by parameter [N per unit of the parameter], shape (n,).
+        members: contribution of each run, specimen and weight of the discrepancy per
+            prior sd of its own [N], shape (n, m). Members by the hundred are left
+            out: one by one none of them matters.
+        place: where the members stand, in prior sds, shape (m,).
+    """
+
+    sd: np.ndarray
+    slopes: dict[str, np.ndarray]
+    members: np.ndarray
+    place: np.ndarray
+
+    def sensitivities(self) -> dict[str, np.ndarray]:
+        """Return the slopes in noise sds, less what the members can take up.
+
+        The squared length of each is the information on its parameter with the members
+        integrated out, their unit priors included.
+        """
+        members = self.members / self.sd[:, None]
+        products = np.eye(members.shape[1]) + members.T @ members
+        columns = {name: slope / self.sd for name, slope in self.slopes.items()}
+        taken = {
+            name: np.linalg.solve(products, members.T @ column)
+            for name, column in columns.items()
+        }
+        return {
+            name: np.concatenate([column - members @ taken[name], -taken[name]])
+            for name, column in columns.items()
+        }
+
+
+def linearise(
+    problem: Problem, values: Mapping[str, np.ndarray], records: Records
+) -> Linearisation:
+    """Linearise the mean reading of the measured rows.
+
+    Args:
+        problem: structure.
+        values: one set of parameters, in code units.
+        records: the rows, not padded.
+    """
+    rows, padded = len(records.force), pad_records(records)
+    columns = discrepancy_columns(problem.discrepancy, padded)
+    names = _free_parameters(problem, values)
+    parts = _derivatives(problem, values, padded, columns, names=names)
+    sd, slopes, stiffening = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
+    members, place = [np.zeros((rows, 0))], [np.zeros(0)]
+    if 0 < problem.runs <= _MOST_MEMBERS:
+        scale = values["run_offset_sd"]
+        # Deviations from the mean of the tested ones, which is the zero itself.
+        is_own = records.run[:, None] == np.arange(problem.runs)
+        members.append(scale * (is_own - 1.0 / problem.runs))
+        place.append(values["run_offset"] / scale)
+    if 0 < problem.specimens <= _MOST_MEMBERS:
+        scale = values["specimen_sd"]
+        is_own = records.specimen[:, None] == np.arange(problem.specimens)
+        members.append(scale * stiffening[:, None] * is_own)
+        place.append(values["specimen_deviation"] / scale)
+    if columns is not None:
+        sizes = values["gap_sd"], values["gap_length"]
+        scale = np.asarray(_prior_sd(problem.discrepancy, *sizes))
+        members.append(columns[:rows] * scale)
+        place.append(values["gap_weights"] / scale)
+    return Linearisation(
+        np.sqrt(sd**2 + problem.step**2 / 12.0),
+        slopes,
+        np.concatenate(members, axis=1),
+        np.concatenate(place),
+    )
+
+
+def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
+    """Return the parameters of the mean that are not fixed."""
+    of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
+    sizes = [name for name in values if name.partition(".")[0] in of_mean]
+    return tuple(
+        name
+        for name in (*_MEAN, *sizes)
+        if name in values and problem.priors[name].family != "fixed"
+    )
+
+
+@jit(static_argnames=("names",))
+def _derivatives(problem: Problem, values, records: Records, columns, *, names):
+    """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
+
+    def mean(part):
+        mean, noise = predict_rows(problem, {**values, **part}, records, columns)
+        return mean, noise.sd[0]
+
+    def stiffer(share):
+        return mean({"K": values["K"] * (1.0 + share)})[0]
+
+    slopes, sd = jax.jacfwd(mean, has_aux=True)({name: values[name] for name in names})
+    return sd, slopes, jax.jvp(stiffer, (0.0,), (1.0,))[1]
+
+
+def resolved_units(
+    problem: Problem, records: Records, base_columns: np.ndarray, noise_sd: float
+) -> dict[str, float]:
+    """Return the standard error of each half-normal amplitude near its null.
+
+    By linear least squares with the base model, and never more than the prior sd.
+
+    Args:
+        problem: structure, with the prior sds of the amplitudes as their units.
+        records: the rows, not padded.
+        base_columns: of the base model, shape (n, 4).
+        noise_sd: pilot noise [N].
+    """
+    slope = np.polyfit(records.deformation, records.force, 1)[0]
+    unit_slope = problem.unit_stiffness * problem.reading.radial_per_read
+    values = {"K": slope / unit_slope, "E0": 1.0, "sigma": noise_sd}
+    values |= dict.fromkeys(("alpha", "force_offset", "deformation_offset"), 0.0)
+    for effect in problem.effects:
+        for field, spec in parameters(effect).items():
+            name = f"{effect.name}.{field}"
+            prior = problem.priors[name]
+            if name in problem.units:
+                # A tenth of the prior sd: at zero itself an effect may have no slope.
+                values[name] = problem.units[name] / 10.0
+            elif spec.null is not None:
+                values[name] = spec.null
+            else:
+                fixed = prior.family == "fixed"
+                values[name] = prior.numbers[0] if fixed else frozen(prior).median()
+    padded, names = pad_records(records), tuple(problem.units)
+    _, slopes, _ = _derivatives(problem, values, padded, None, names=names)
+    rows = len(base_columns)
+    return {
+        name: standard_error(
+            np.asarray(slopes[name])[:rows], base_columns, noise_sd, widest
+        )
+        for name, widest in problem.units.items()
+    }
+
+
+def standard_error(
+    column: np.ndarray, columns: np.ndarray, noise_sd: float, most: float
+) -> float:
+    """Return the standard error of a parameter fitted together with others.
+
+    Args:
+        column: derivative of the mean reading by the parameter, shape (n,).
+        columns: derivatives by the others, to any scale, shape (n, p).
+        noise_sd: of the readings.
+        most: the largest error, such as a prior sd.
+    """
+    fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
+    length = float(np.linalg.norm(column - fitted))
+    return min(most, noise_sd / length) if length > 0.0 and noise_sd > 0.0 else most
+
+
+@jit
+def _prior_sd(discrepancy: Discrepancy, sd, length):
+    return discrepancy.prior_sd(sd, length)
+
+
+def unidentified(
+    sensitivities: Mapping[str, np.ndarray], problem: Sampled
+) -> tuple[list[str], list[str]]:
+    """Return parameters without any effect, and a sentence for each flat direction.
+
+    A direction is flat when the data say less along it than the priors do: with J the
+    sensitivity in noise sds and S the prior sds, where ‖J v‖² < ‖v/S‖².
+
+    Args:
+        sensitivities: of the readings to each parameter, in noise sds.
+        problem: priors.
+    """
+    # In units of its prior sd every parameter has prior precision one.
+    scaled = {
+        name: slope * moments(problem.priors[name], name)[1]
+        for name, slope in sensitivities.items()
+    }
+    length = {name: float(np.linalg.norm(column)) for name, column in scaled.items()}
+    without_effect = [name for name in scaled if length[name] < _NO_EFFECT]
+    weak = [name for name in scaled if _NO_EFFECT <= length[name] < 1.0]
+    sentences = [
+        f"{name} is hardly seen by this data; its prior is the answer" for name in weak
+    ]
+    strong = {name: column for name, column in scaled.items() if length[name] >= 1.0}
+    if len(strong) > 1:
+        # As few numbers as have the same inner products.
+        few = np.linalg.qr(np.stack([*strong.values()], axis=1), mode="r")
+        groups = _inseparable(dict(zip(strong, np.transpose(few), strict=True)))
+        sentences += [_sentence(names) for names in groups]
+    return without_effect, sentences
+
+
+def _inseparable(columns: dict[str, np.ndarray]) -> list[list[str]]:
+    """Return as many groups as there are flat directions, pairs before larger ones."""
+    strength, vectors = _strengths(list(columns.values()))
+    flat = int(np.sum(strength < 1.0))
+    # Rounded, so that the first of equal directions is named.
+    weakest = {
+        pair: round(float(_strengths([columns[name] for name in pair])[0][-1]), 9)
+        for pair in combinations(columns, 2)
+    }
+    groups: list[list[str]] = []
+    linked: dict[str, set[str]] = {name: {name} for name in columns}
+    for (one, other), least in sorted(weakest.items(), key=lambda item: item[1]):
+        if least >= 1.0 or len(groups) == flat:
+            break
+        # A pair that others already link is no further direction.
+        if other not in linked[one]:
+            joined = linked[one] | linked[other]
+            linked |= dict.fromkeys(joined, joined)
+            groups.append([one, other])
+    for vector in vectors[::-1][: flat - len(groups)]:
+        part = np.abs(vector) / np.abs(vector).max()
+        names = [n for n, p in zip(columns, part, strict=True) if p >= _SHARE]
+        if len(names) > 2:
+            groups.append(names)
+    return groups
+
+
+def _strengths(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return singular values, largest first, and right singular vectors."""
+    table = np.stack(columns, axis=1)
+    # One singular value per column, also with fewer rows than columns.
+    padded = np.vstack([table, np.zeros((table.shape[1], table.shape[1]))])
+    _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
+    return strength, vectors
+
+
+def _sentence(names: list[str]) -> str:
+    if set(names) == {"K", "E0"}:
+        return (
+            "K and E0 cannot be told apart by this data; their product can, and with "
+            "the prior of E0 that tells K"
+        )
+    listed = ", ".join(names[:-1]) + " and " + names[-1]
+    return f"{listed} cannot be told apart by this data; one combination of them can"

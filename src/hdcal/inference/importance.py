@@ -1,0 +1,206 @@
+"""Importance sampling of a posterior with few parameters: a draw costs one density.
+
+Two multivariate t distributions propose, a narrow and a wide one. In rounds they take
+mean and covariance of the weighted proposals; then proposals are resampled. Where they
+cover the posterior badly nothing is returned.
+
+Source:
+    Cappé, Guillin, Marin and Robert, Journal of Computational and Graphical Statistics
+    13 (2004), population Monte Carlo; Vehtari et al., Journal of Machine Learning
+    Research 25 (2024), Pareto k.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Float
+from scipy.special import gammaln, softmax
+
+from hdcal.data.records import Array
+from hdcal.exported import jit
+from hdcal.inference.diagnostics import pareto_shape
+from hdcal.inference.laplace import Whitening, potential, values_at
+from hdcal.inference.sampled_problem import Sampled
+
+# Largest Pareto k of weights whose proposals cover the posterior.
+MAX_SHAPE = 0.7
+# Tails heavier than a posterior's, which keep weights bounded.
+_FREEDOM = 8.0
+# Share of the wide distribution, and how much wider it is than the weighted proposals.
+_WIDE_SHARE, _WIDER = 0.2, 1.7
+# Least variance of the narrow one, in variances at the mode.
+_LEAST_VARIANCE = 0.01
+# Proposals of each round, and the efficiency and Pareto k at which rounds end.
+_ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5
+# Most proposals for each draw that is kept.
+_MOST = 12
+# Densities between two calls of `progress`.
+_BLOCK = 500
+
+
+@dataclass(frozen=True)
+class TMixture:
+    """A mixture of multivariate t distributions of equal degrees of freedom.
+
+    Attributes:
+        share: of each component, shape (k,).
+        centre: shape (k, d).
+        root: Cholesky factor of the scale matrix, shape (k, d, d).
+        freedom: degrees of it.
+    """
+
+    share: np.ndarray
+    centre: np.ndarray
+    root: np.ndarray
+    freedom: float = _FREEDOM
+
+    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Return places, shape (count, d)."""
+        component = rng.choice(len(self.share), count, p=self.share)
+        normal = rng.standard_normal((count, self.centre.shape[1]))
+        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
+        step = np.einsum("nij,nj->ni", self.root[component], normal)
+        return self.centre[component] + tail[:, None] * step
+
+    def log_density(self, place: np.ndarray) -> np.ndarray:
+        """Return the log density at each place, shape (n, d)."""
+        size = place.shape[1]
+        half = 0.5 * (self.freedom + size)
+        constant = gammaln(half) - gammaln(0.5 * self.freedom)
+        constant -= 0.5 * size * np.log(np.pi * self.freedom)
+        each = []
+        for share, centre, root in zip(self.share, self.centre, self.root, strict=True):
+            square = np.sum(np.linalg.solve(root, (place - centre).T) ** 2, axis=0)
+            volume = np.sum(np.log(np.diag(root)))
+            tail = half * np.log1p(square / self.freedom)
+            each.append(np.log(share) + constant - volume - tail)
+        return np.logaddexp.reduce(each)
+
+
+class ImportanceDraws(NamedTuple):
+    """Resampled draws, and how well proposals covered the posterior.
+
+    Attributes:
+        values: by site name, each of shape (chain, draw); chains are exchangeable.
+        shape: Pareto k of the largest weights.
+    """
+
+    values: dict[str, np.ndarray]
+    shape: float
+
+
+def sample_by_importance(
+    problem: Sampled,
+    whitening: Whitening,
+    seed: int,
+    *,
+    chains: int,
+    draws: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> ImportanceDraws | None:
+    """Draw from a posterior with few parameters, in its whitened coordinates.
+
+    The proposals are worth at least as many independent draws as are kept.
+
+    Args:
+        problem: the inference problem, with every parameter among its coordinates.
+        whitening: its mode and curvature, from `laplace.fit`.
+        seed: the same one gives the same draws.
+        chains: groups of draws.
+        draws: kept of each group.
+        progress: called with (densities computed, densities in all).
+
+    Returns:
+        The draws; None where proposals cover the posterior badly.
+    """
+    rng, kept = np.random.default_rng(seed), chains * draws
+    proposals, efficiency = _adapted(problem, whitening, rng)
+    if efficiency < 1.0 / _MOST:
+        return None
+    place = proposals.draw(int(kept / efficiency), rng)
+    weight = _weights(problem, whitening, proposals, place, progress)
+    shape = pareto_shape(weight)
+    if not shape <= MAX_SHAPE or 1.0 / np.sum(weight**2) < 0.5 * kept:
+        return None
+    # Systematic resampling: a place is kept as often as its weight has it, ± 1.
+    level = (np.arange(kept) + rng.random()) / kept
+    chosen = np.searchsorted(np.cumsum(weight), level).clip(max=len(place) - 1)
+    standard = place[rng.permutation(chosen)].reshape(chains, draws, -1)
+    named = _named(problem, whitening, standard)
+    return ImportanceDraws({n: np.asarray(v) for n, v in named.items()}, shape)
+
+
+def _adapted(
+    problem: Sampled, whitening: Whitening, rng: np.random.Generator
+) -> tuple[TMixture, float]:
+    """Return proposals, and the effective sample size for each of the last ones."""
+    size, efficiency = len(whitening.factor), 0.0
+    proposals = _proposals(np.zeros(size), np.eye(size))
+    for count in _ROUNDS:
+        place = proposals.draw(count, rng)
+        weight = _weights(problem, whitening, proposals, place)
+        if not np.isfinite(weight).all():
+            return proposals, 0.0
+        efficiency = 1.0 / (count * np.sum(weight**2))
+        if efficiency >= _EFFICIENT and pareto_shape(weight) <= _LIGHT:
+            break
+        # A few places with most of the weight would decide mean and covariance.
+        share = np.minimum(weight, 1.0 / np.sqrt(count))
+        share /= share.sum()
+        centre = share @ place
+        off = place - centre
+        covariance = (share * off.T) @ off + _LEAST_VARIANCE * np.eye(size)
+        proposals = _proposals(centre, covariance)
+    return proposals, float(efficiency)
+
+
+def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
+    root = np.linalg.cholesky(covariance)
+    return TMixture(
+        np.array([1.0 - _WIDE_SHARE, _WIDE_SHARE]),
+        np.stack([centre, centre]),
+        np.stack([root, _WIDER * root]),
+    )
+
+
+def _weights(
+    problem: Sampled,
+    whitening: Whitening,
+    proposals: TMixture,
+    place: np.ndarray,
+    progress: Callable[[int, int], None] | None = None,
+) -> np.ndarray:
+    """Return the importance weight of each place, shape (n, d); they sum to 1."""
+    density = np.empty(len(place))
+    for start in range(0, len(place), _BLOCK):
+        block = place[start : start + _BLOCK]
+        # Blocks of one length are one program.
+        padded = np.resize(block, (_BLOCK, place.shape[1]))
+        log_density = -np.asarray(_potentials(problem, whitening, padded))
+        density[start : start + _BLOCK] = log_density[: len(block)]
+        if progress is not None:
+            progress(start + len(block), len(place))
+    density = np.where(np.isfinite(density), density, -np.inf)
+    return softmax(density - proposals.log_density(place))
+
+
+@jit
+def _potentials(
+    problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
+) -> Float[Array, " n"]:
+    def one(place):
+        return potential(problem, whitening.position(place))
+
+    # One after the other: side by side many gears fill the memory.
+    return jax.lax.map(one, standard)
+
+
+@jit
+def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
+    def one(place):
+        return values_at(problem, whitening.position(place))
+
+    return jax.vmap(lambda group: jax.lax.map(one, group))(standard)
