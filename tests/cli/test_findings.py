@@ -100,8 +100,7 @@ def test_the_library_speaks_of_its_parameters():
 LONG = "x" * 50_000
 
 
-def test_nothing_long_is_printed_whole(here: Hdcal, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_nothing_long_is_printed_whole(here: Hdcal, tmp_path):
     (tmp_path / "gear.toml").write_bytes((XB1 / "gear.toml").read_bytes())
     cells = f"deformation_mm,{LONG}\n{LONG},1\n" + "0,1\n" * 5
     (tmp_path / "data.csv").write_text(cells)
