@@ -185,3 +185,14 @@ def test_a_part_that_gives_way_after_cycles_ends_the_record():
     y[470:] = 3.0
     one = only(screen(x, y))
     assert (one.kind, one.rows) == ("after the largest force", ((470, 499),))
+
+
+def test_a_logger_that_is_faster_than_its_gauges_repeats_readings():
+    x, y = ramp(40)
+    found = screen(np.repeat(x, 7), np.repeat(y, 7))
+    (one,) = found.observations
+    assert (one.kind, one.count, one.size) == ("repeated reading", 240, 7.0)
+    assert np.array_equal(found.deformation[found.kept], x)
+    # A hold at a few places is no such logger.
+    held = np.r_[np.arange(40), np.full(60, 39)]
+    assert not screen(x[held], y[held]).observations

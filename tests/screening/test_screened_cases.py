@@ -85,7 +85,7 @@ def broken() -> hdcal.Posterior:
     """A part that gives way at 0.7 mm."""
     frame = table()
     frame.loc[84:, "force_N"] = 1.0
-    return hdcal.calibrate(hdcal.read_case(frame), warmup=200, draws=200)
+    return hdcal.calibrate(hdcal.read_case(frame), warmup=500, draws=500)
 
 
 def test_what_a_part_gave_way_at_is_not_predicted(broken: hdcal.Posterior):

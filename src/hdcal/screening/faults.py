@@ -12,7 +12,14 @@ from hdcal.screening.channels import (
 )
 from hdcal.screening.ends import rows_before_tare
 from hdcal.screening.jumps import Jump, find_jump
-from hdcal.screening.result import DROPPED, SATURATED, TARE, WILD, Kind
+from hdcal.screening.result import (
+    DROPPED,
+    REPEATED,
+    SATURATED,
+    TARE,
+    WILD,
+    Kind,
+)
 from hdcal.screening.run import Run
 from hdcal.screening.wild import FEWEST, wild_readings
 
@@ -24,6 +31,9 @@ _MOST_WILD = 0.1
 _FEWEST_AFTER = 5
 # Share of the range within which nothing moves.
 _REST = 0.02
+# Share of the readings that stand in the usual number of rows, or in one more or less,
+# where the logger is faster than the gauges.
+_REGULAR = 0.9
 _JUMPS: dict[str, tuple[Kind, str]] = {
     "force": ("jump of the force", "N"),
     "deformation": ("jump of the deformation", "mm"),
@@ -35,6 +45,7 @@ def look_at(one: Run) -> None:
     """Find what is wrong with the readings of a run."""
     if one.time is not None:
         _clock(one)
+    _repeats(one)
     if one.plain or one.x.size < FEWEST or not np.ptp(one.x) or not np.ptp(one.y):
         return
     _tare(one)
@@ -72,6 +83,23 @@ def _clock(one: Run) -> None:
         return
     one.time = counted_on(one.time, back)
     one.observe("clock", back, size, "s", "new zero")
+
+
+def _repeats(one: Run) -> None:
+    """Leave out rows that repeat a reading, where a logger is faster than its gauges.
+
+    Each reading then stands in as many rows; a hold has as many as it takes.
+    """
+    kept, rows = np.flatnonzero(one.kept), one.distinct()
+    times = np.diff(np.searchsorted(kept, rows))
+    if rows.size < FEWEST or np.median(times) < 2.0:
+        return
+    usual = float(np.median(times))
+    if np.mean(np.abs(times - usual) <= 1.0) < _REGULAR:
+        return
+    repeated = np.setdiff1d(kept, rows)
+    one.cut(repeated, REPEATED)
+    one.observe("repeated reading", repeated, usual, "rows", "cut")
 
 
 def _tare(one: Run) -> None:

@@ -20,6 +20,7 @@ Kind = Literal[
     "scatter of the deformation",
     "after the largest force",
     "outside the range",
+    "repeated reading",
 ]
 Action = Literal["cut", "new zero", "turned", "asked", "smoothed"]
 # What a row belongs to; the order is that of `Screening.segment`.
@@ -32,8 +33,11 @@ SEGMENTS = (
     "wild reading",
     "saturated",
     "outside the range",
+    "repeated reading",
 )
-LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE = range(8)
+LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE, REPEATED = range(
+    len(SEGMENTS)
+)
 # Share by which stiffnesses differ at least: less matters to nobody, however well both
 # are known.
 LEAST_DIFFERENCE = 0.1

@@ -20,17 +20,18 @@ from hdcal.report.chart_spec import (
     Points,
     drawn_rows,
 )
-from hdcal.screening.result import SEGMENTS, Screening
+from hdcal.screening.result import REPEATED, SEGMENTS, Screening
 
 # Of the segments of a record; runs and specimens have the colours of the cycle.
 _COLOURS = dict(
     zip(
         SEGMENTS,
-        (CYCLE[0], ORANGE, GREEN, PURPLE, RED, YELLOW, SKY, GREY),
+        (CYCLE[0], ORANGE, GREEN, PURPLE, RED, YELLOW, SKY, GREY, GREY),
         strict=True,
     )
 )
-ALL = range(len(SEGMENTS))
+# A row that repeats the one before would hide it.
+ALL = [place for place in range(len(SEGMENTS)) if place != REPEATED]
 
 
 def readings_chart(case: Case) -> Chart:
