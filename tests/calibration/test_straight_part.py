@@ -86,3 +86,32 @@ def test_calibrate_takes_the_straight_part_unless_all_is_asked_for(
     middle = answer["stiffness_N_per_mm"]["median"]
     assert middle == pytest.approx(expected, rel=0.02)
     assert "no straight line" in answer["headline"]
+
+
+def two_branches() -> tuple[np.ndarray, np.ndarray]:
+    """Return a part of 80 N/mm that yields by 4 mm, and its unloading."""
+    up = np.r_[np.linspace(0.0, 1.0, 60), np.linspace(1.0, 5.0, 60)]
+    force = 80.0 * np.minimum(up, 1.0)
+    down = np.linspace(5.0, 4.0, 60)
+    noise = np.random.default_rng(2).normal(0.0, 0.05, 180)
+    return np.r_[up, down], np.r_[force, 80.0 * (down - 4.0)] + noise
+
+
+def test_a_range_with_branches_on_two_lines_fails():
+    case = read(*two_branches(), range="10%:50%")
+    x, y = np.asarray(case.records.deformation), np.asarray(case.records.force)
+    slope = float(np.polyfit(x, y, 1)[0])
+    # Half of the force comes again 4 mm farther on.
+    assert abs(slope) < 10.0
+    assert straight_check(case, np.full(500, slope)).outcome == "failed"
+    assert straight_check(case, np.full(500, 80.0)).outcome == "passed"
+    # Each remedy that the check names gives the stiffness.
+    for remedy in ("straight", "0.1:0.5"):
+        kept = read(*two_branches(), range=remedy).records
+        line = np.polyfit(kept.deformation, kept.force, 1)
+        assert line[0] == pytest.approx(80.0, rel=0.01)
+
+
+def test_a_range_of_one_line_passes():
+    case = read(*two_branches(), range="0.1:0.9")
+    assert straight_check(case, np.full(500, 80.0)).outcome == "passed"

@@ -24,8 +24,8 @@ def takes_straight_part(case: Case) -> bool:
     Args:
         case: records with their screening.
     """
-    part, x = _part(case), np.asarray(case.records.deformation)
-    if part is None or not np.ptp(x):
+    found, part, x = case.screening, _part(case), np.asarray(case.records.deformation)
+    if found is None or found.working_range or part is None or not np.ptp(x):
         return False
     slope = float(np.polyfit(x, case.records.force, 1)[0])
     return abs(slope - part.slope) > _unsure(part, _CLASS)
@@ -49,22 +49,22 @@ def straight_check(case: Case, stiffness: np.ndarray) -> "Check":
     words = (
         f"the curve is no straight line: its longest straight part, {ends}, has "
         f"{part.slope:.4g} {units.stiffness_unit} and the model {middle:.4g}. "
-        "Choose this part by the range straight, another one by its ends, or all of "
-        "the curve by the range all"
+        "Choose the longest straight part of the record by the range straight, another "
+        "one by its ends, or all of the curve by the range all"
     )
     return Check(name, "failed", words)
 
 
 def _part(case: Case) -> StraightPart | None:
-    """Return the longest straight part of a curve that is no line.
+    """Return the longest straight part, in the range, of a curve that is no line.
 
-    None where a range was chosen.
+    None where all of the curve, or its straight part, was chosen.
     """
     found = case.screening
-    part = None if found is None else found.straight
-    if found is None or part is None or part.whole or found.working_range:
+    if found is None:
         return None
-    return part
+    part = found.straight_in_range if found.working_range else found.straight
+    return None if part is None or part.whole else part
 
 
 def _unsure(part: StraightPart, share: float) -> float:

@@ -113,6 +113,8 @@ class Screening:
         straight: the longest straight part of a single run; None of several ones, and
             where too few rows are left.
         working_range: in words; empty where none is stated.
+        straight_in_range: the longest straight part within a range that was chosen by
+            its ends, likewise.
     """
 
     observations: tuple[Observation, ...]
@@ -126,6 +128,7 @@ class Screening:
     trembling: bool = False
     straight: StraightPart | None = None
     working_range: str = ""
+    straight_in_range: StraightPart | None = None
 
     @property
     def excluded(self) -> tuple[tuple[float, float], ...]:

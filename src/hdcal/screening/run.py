@@ -37,6 +37,29 @@ class Run:
     plain: bool = False
     observations: list[Observation] = field(default_factory=list)
 
+    @classmethod
+    def of(
+        cls,
+        rows: np.ndarray,
+        x: np.ndarray,
+        y: np.ndarray,
+        time: np.ndarray | None = None,
+        index: int = 0,
+    ) -> "Run":
+        """Return some rows of a record, all of them kept.
+
+        Args:
+            rows: of the record, in order, shape (r,).
+            x: deformation of the record, shape (n,).
+            y: force of the record, shape (n,).
+            time: of the record, or None.
+            index: of the run.
+        """
+        clock = None if time is None else time[rows]
+        segment, zero = np.zeros((2, rows.size), int)
+        kept = np.ones(rows.size, bool)
+        return cls(index, rows, x[rows], y[rows], clock, segment, kept, zero)
+
     def observe(
         self, kind: Kind, rows: np.ndarray, size: float, unit: str, action: Action
     ) -> None:

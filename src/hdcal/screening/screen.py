@@ -39,18 +39,7 @@ def screen(
     runs = []
     plain = plain_runs(x, y, index)
     for rows in np.split(order, cuts):
-        t = None if clock_read is None else clock_read[rows]
-        empty = np.zeros(rows.size, int)
-        one = Run(
-            int(index[rows[0]]),
-            rows,
-            x[rows],
-            y[rows],
-            t,
-            empty.copy(),
-            np.ones(rows.size, bool),
-            empty.copy(),
-        )
+        one = Run.of(rows, x, y, clock_read, int(index[rows[0]]))
         one.plain = bool(plain[one.index])
         look_at(one)
         runs.append(one)

@@ -50,11 +50,8 @@ _SENTENCES = {
     "each row is moved along the line to the {deformation} smoothed over the rows",
     ("after the largest force", "cut"): "{count} left out ({rows}): the {force} "
     "has dropped by {size} {unit} for good while the {deformation} goes on",
-    (
-        "repeated reading",
-        "cut",
-    ): "{count} left out: each reading stands in {size} rows, "
-    "as the logger is faster than the gauges",
+    ("repeated reading", "cut"): "{count} left out: each reading stands in {size} "
+    "rows, as the logger is faster than the gauges",
     ("outside the range", "cut"): "{count} left out: outside the working range of "
     "{range}",
 }

@@ -8,7 +8,15 @@ from typing import Literal
 import numpy as np
 
 from hdcal.quantities import Quantities
-from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
+from hdcal.screening.branches import straight_part
+from hdcal.screening.result import (
+    OUTSIDE,
+    Observation,
+    Screening,
+    StraightPart,
+    stretches,
+)
+from hdcal.screening.run import Run
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
 FORM = (
@@ -95,7 +103,8 @@ def in_range(
     """
     part = screening.straight
     if wanted.unit == STRAIGHT and part is not None:
-        wanted, inside = replace(wanted, low=part.low, high=part.high), part.rows
+        wanted, inside = WorkingRange(part.low, part.high, "mm"), part.rows
+        part = None
     else:
         inside = np.zeros(run.size, bool)
         for index in np.unique(run):
@@ -120,4 +129,13 @@ def in_range(
         segment=segment,
         kept=inside,
         working_range=wanted.words(units),
+        straight_in_range=None if part is None else _straight(screening, inside),
     )
+
+
+def _straight(screening: Screening, inside: np.ndarray) -> StraightPart | None:
+    """Return the longest straight part of some rows of a record of one run."""
+    rows = np.flatnonzero(inside)
+    one = Run.of(rows, screening.deformation, screening.force)
+    one.scatter = screening.deformation_sd
+    return straight_part(one, inside.size)

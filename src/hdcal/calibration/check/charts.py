@@ -31,7 +31,7 @@ _COLOURS = dict(
     )
 )
 # A row that repeats the one before would hide it.
-ALL = [place for place in range(len(SEGMENTS)) if place != REPEATED]
+_DRAWN = [place for place in range(len(SEGMENTS)) if place != REPEATED]
 
 
 def readings_chart(case: Case) -> Chart:
@@ -76,7 +76,7 @@ def _kept(found: Screening) -> Iterator[Points]:
     yield from _segments(found, found.kept, "o", "")
 
 
-def left_out(found: Screening, segments: Iterable[int] = ALL) -> Iterator[Points]:
+def left_out(found: Screening, segments: Iterable[int] = _DRAWN) -> Iterator[Points]:
     """Yield the rows that were left out, as crosses.
 
     Args:
