@@ -12,7 +12,8 @@ from pydantic import ValidationError
 
 from hdcal.report import sentences
 from hdcal.report.chart_spec import Chart, Line, Panel
-from hdcal.report.result import Draws, Interval, Item, Result, quantity
+from hdcal.report.item import Draws, Interval, Item, quantity
+from hdcal.report.result import Result
 from hdcal.report.table_files import columns_csv
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"

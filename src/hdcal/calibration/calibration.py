@@ -18,13 +18,13 @@ from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.chart_spec import Chart
 from hdcal.report.draws_charts import prior_chart, rank_chart
+from hdcal.report.item import Interval, Words
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,
     ParameterEstimate,
     PosteriorResult,
     posterior_fields,
 )
-from hdcal.report.result import Interval, Words
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]

@@ -9,7 +9,8 @@ from pydantic import Field, InstanceOf
 from hdcal.calibration.charts import residual_chart
 from hdcal.inference.residuals import Residuals
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import Item, Result, Words, quantity
+from hdcal.report.item import Item, Words, quantity
+from hdcal.report.result import Result
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,8 +23,9 @@ from hdcal.prediction.engine.causes import averaging_words
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.pooled import Pooled, pool
 from hdcal.report.chart_spec import Chart
+from hdcal.report.item import INTERVAL, Interval, Item, Words
 from hdcal.report.provenance import data_rows, gear_rows
-from hdcal.report.result import INTERVAL, Interval, Item, Result, Words
+from hdcal.report.result import Result
 
 # Beyond this condition number of the scaled columns no digit of a coefficient is left.
 _WORST_CONDITION = 1e14

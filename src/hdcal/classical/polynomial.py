@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import solve_triangular
 
-from hdcal.report.result import INTERVAL, Draws, Item, quantity
+from hdcal.report.item import INTERVAL, Draws, Item, quantity
 
 # A smaller p value counts as lack of fit.
 SIGNIFICANCE = 0.05

@@ -14,17 +14,17 @@ from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.engine.causes import Cause, causes_of
 from hdcal.prediction.engine.models import Models
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import (
+from hdcal.report.item import (
     INTERVAL,
     Count,
     Draws,
     Interval,
     Item,
     Probability,
-    Result,
     Words,
     quantity,
 )
+from hdcal.report.result import Result
 from hdcal.report.words import label
 
 # Draws of each result that are compared with those of the others.

@@ -9,7 +9,8 @@ from pydantic import Field, InstanceOf, computed_field
 from hdcal.data.theory_names import Theory
 from hdcal.design.design_draws import DesignDraws
 from hdcal.design.extrapolation import Extrapolation
-from hdcal.report.result import INTERVAL, Count, Interval, Item, Result, Words, quantity
+from hdcal.report.item import INTERVAL, Count, Interval, Item, Words, quantity
+from hdcal.report.result import Result
 
 Numbers = tuple[float, ...]
 Ends = tuple[float, float]

@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.design.design_draws import DesignDraws
 from hdcal.prediction.engine.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.margin.result import FAR
-from hdcal.report.result import Item
+from hdcal.report.item import Item
 
 # Ratio to the tested size beyond which no data support K.
 _FAR_SIZE = 1.2

@@ -12,18 +12,10 @@ from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
+from hdcal.report.item import INTERVAL, Count, Digest, Interval, Item, Words, quantity
 from hdcal.report.parameters import parameter_estimates
 from hdcal.report.provenance import data_rows, provenance_rows
-from hdcal.report.result import (
-    INTERVAL,
-    Count,
-    Digest,
-    Interval,
-    Item,
-    Result,
-    Words,
-    quantity,
-)
+from hdcal.report.result import Result
 from hdcal.report.words import capital, label, prior_words
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"

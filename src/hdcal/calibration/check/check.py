@@ -18,7 +18,8 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
+from hdcal.report.item import Count, Digest, EffectName, Item, Words, quantity
+from hdcal.report.result import Result
 from hdcal.report.sentences import rendered
 from hdcal.report.units import UNITS
 from hdcal.screening.result import HOLDING, LOADING, SEGMENTS

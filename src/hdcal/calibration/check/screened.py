@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hdcal.report.result import Count, Item, Words
+from hdcal.report.item import Count, Item, Words
 from hdcal.screening.result import SEGMENTS, Screening
 
 

@@ -7,7 +7,8 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.result import EffectName, Item, Result, Words
+from hdcal.report.item import EffectName, Item, Words
+from hdcal.report.result import Result
 from hdcal.report.words import prior_words
 
 

@@ -13,7 +13,7 @@ from hdcal.design.inverse_design.force_limit import LimitedGear
 from hdcal.design.inverse_design.nearest_point import CLOSE, nearest_kept
 from hdcal.exported import jit
 from hdcal.prediction.engine.sizes import SIZES
-from hdcal.report.result import Interval, Probability, quantity
+from hdcal.report.item import Interval, Probability, quantity
 
 # Draws on either side of a quantile from which its slope is computed.
 _BESIDE = 50

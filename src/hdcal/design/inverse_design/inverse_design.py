@@ -36,7 +36,7 @@ from hdcal.design.sizes import geometry_with, named, with_reference
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.engine.models import Models
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import Words
+from hdcal.report.item import Words
 
 
 class InverseDesign(DesignResult):

@@ -23,7 +23,7 @@ from hdcal.prediction.engine.loading_sense import (
     sense_of,
 )
 from hdcal.prediction.engine.sizes import SIZES
-from hdcal.report.result import Item
+from hdcal.report.item import Item
 
 
 class LimitAsked(Item):

@@ -28,8 +28,8 @@ from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 from hdcal.report.chart_spec import Chart
+from hdcal.report.item import Interval
 from hdcal.report.markdown import MOST_ROWS
-from hdcal.report.result import Interval
 
 AXES = (*SIZES, "deformation_mm", "temperature_C")
 MOST_DESIGNS, MOST_AXES, MOST_MATERIALS = 100_000, 4, 20

@@ -23,7 +23,7 @@ from hdcal.design.wave_generator.window import WindowAsked
 from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.loading_sense import ends_along
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import Draws, Interval, Item, Probability, Words, quantity
+from hdcal.report.item import Draws, Interval, Item, Probability, Words, quantity
 
 
 class ChosenSpring(Item):

@@ -15,7 +15,7 @@ Deformations, forces and set points are along the sense of loading
 
 import numpy as np
 
-from hdcal.report.result import Item, quantity
+from hdcal.report.item import Item, quantity
 
 # Number of rates, evenly spaced in their logarithm.
 _RATES = 61

@@ -8,7 +8,7 @@ from hdcal.design.design_draws import DesignDraws
 from hdcal.design.design_result import Ends, Numbers
 from hdcal.errors import Finding
 from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along, sense_of
-from hdcal.report.result import Item
+from hdcal.report.item import Item
 
 
 class WindowAsked(Item):

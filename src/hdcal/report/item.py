@@ -1,0 +1,132 @@
+"""Fields of a result: items with labels and units, intervals and texts."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AliasGenerator, BaseModel, ConfigDict, Field
+
+from hdcal.quantities import Quantities
+
+INTERVAL = 0.95
+
+Words = Annotated[str, Field(min_length=1)]
+Count = Annotated[int, Field(ge=0)]
+EffectName = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+# Sums of probabilities may exceed one by a rounding error.
+Probability = Annotated[float, Field(ge=0.0, le=1.000001)]
+# What charts need and JSON does not hold.
+Draws = Annotated[np.ndarray, Field(exclude=True)]
+
+
+def quantity(
+    label: str, unit: str = "", *, column: str | None = None, **limits: Any
+) -> Any:
+    """Declare a field.
+
+    Args:
+        label: shown on axes and in tables.
+        unit: of the number; empty for a dimensionless one.
+        column: name in tables; by default the name of the field.
+        limits: further constraints, as of pydantic's `Field`.
+    """
+    extra = {"unit": unit, "column": column}
+    given = {name: text for name, text in extra.items() if text}
+    return Field(title=label, json_schema_extra=given or None, **limits)
+
+
+def _json_name(name: str) -> str:
+    # `schema` is a method of pydantic's models, `from` a keyword.
+    return "schema" if name == "format" else name.rstrip("_")
+
+
+class Item(BaseModel):
+    """Frozen fields with labels and units."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        arbitrary_types_allowed=True,
+        alias_generator=AliasGenerator(serialization_alias=_json_name),
+        serialize_by_alias=True,
+        ser_json_inf_nan="null",
+        json_schema_serialization_defaults_required=True,
+    )
+
+    @classmethod
+    def label(cls, name: str) -> str:
+        """Return label and unit of a field, as an axis shows them."""
+        title, unit = cls.model_fields[name].title or name, cls._extra(name, "unit")
+        return f"{title} [{unit}]" if unit else title
+
+    @classmethod
+    def _extra(cls, name: str, key: str) -> str:
+        extra = cls.model_fields[name].json_schema_extra
+        return str(extra.get(key, "")) if isinstance(extra, Mapping) else ""
+
+    def columns(self) -> dict[str, Any]:
+        """Return numbers and texts keyed by column name.
+
+        The ends of an interval stand beside its median as `_lo` and `_hi`: those of
+        `stiffness_N_per_mm` are `stiffness_lo` and `stiffness_hi`.
+        """
+        found: dict[str, Any] = {}
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            column = self._extra(name, "column") or _json_name(name)
+            if isinstance(value, Interval):
+                unit = self._extra(name, "unit").replace("/", "_per_")
+                stem = column.removesuffix(f"_{unit}")
+                found |= {column: value.median}
+                found |= {f"{stem}_lo": value.lo, f"{stem}_hi": value.hi}
+            elif isinstance(value, Item):
+                inner = value.columns().items()
+                found |= {f"{column}_{key}": each for key, each in inner}
+            elif not field.exclude and not isinstance(value, tuple | dict):
+                found[column] = value
+        return found
+
+
+class Interval(Item):
+    """Median and ends of an equal-tailed interval."""
+
+    median: float
+    lo: float
+    hi: float
+
+    @property
+    def size(self) -> "Interval":
+        """The interval with its sign changed if the median is negative."""
+        if self.median >= 0.0:
+            return self
+        return Interval(median=-self.median, lo=-self.hi, hi=-self.lo)
+
+    @classmethod
+    def of(cls, draws: np.ndarray, probability: float = INTERVAL) -> "Interval":
+        """Return the equal-tailed interval of draws with this probability."""
+        tail = (1.0 - probability) / 2.0
+        lo, median, hi = np.quantile(draws, [tail, 0.5, 1.0 - tail])
+        return cls(median=float(median), lo=float(lo), hi=float(hi))
+
+
+def with_units(value: Any, plain: Any, units: Quantities) -> Any:
+    """Return the JSON form of a value with its fields named after what was measured.
+
+    Args:
+        value: an item, or several of them.
+        plain: its JSON form.
+        units: names and units of what was measured.
+    """
+    if isinstance(value, Item):
+        names = {_json_name(name): name for name in type(value).model_fields}
+        held = {key: getattr(value, str(names.get(key, key))) for key in plain}
+        return {units.key(k): with_units(held[k], plain[k], units) for k in plain}
+    if isinstance(value, Mapping):
+        return {k: with_units(each, plain[k], units) for k, each in value.items()}
+    if isinstance(value, tuple):
+        return [
+            with_units(each, item, units)
+            for each, item in zip(value, plain, strict=True)
+        ]
+    return plain
