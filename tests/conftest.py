@@ -91,20 +91,21 @@ def few_executables() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def own_traces(request: pytest.FixtureRequest) -> None:
+def own_traces() -> Iterator[None]:
     """Keep no trace of code that a test has changed, and load none in its place."""
-    if "monkeypatch" not in request.fixturenames:
-        return
-    patch = request.getfixturevalue("monkeypatch")
-    change = patch.setattr
+    change = pytest.MonkeyPatch.setattr
 
-    def change_untraced(target: object, *given: Any, **named: Any) -> None:
-        change(target, *given, **named)
+    def change_untraced(
+        patch: pytest.MonkeyPatch, target: object, *given: Any, **named: Any
+    ) -> None:
+        change(patch, target, *given, **named)
         if isinstance(target, str):
             changed = target
         else:
             changed = getattr(target, "__module__", getattr(target, "__name__", ""))
         if changed.startswith("hdcal.") and not changed.startswith(_NEVER_TRACED):
-            change("hdcal.exported._needs_plain_jit", lambda leaves: True)
+            change(patch, "hdcal.exported._needs_plain_jit", lambda: True)
 
-    patch.setattr = change_untraced
+    with pytest.MonkeyPatch.context() as hook:
+        hook.setattr(pytest.MonkeyPatch, "setattr", change_untraced)
+        yield

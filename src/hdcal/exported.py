@@ -20,6 +20,13 @@ import numpy as np
 from jax.core import Tracer
 
 # Packages whose code may be part of a trace; the digest holds their versions.
+# Settings that a trace depends on.
+_TRACE_SETTINGS = (
+    "jax_enable_x64",
+    "jax_threefry_partitionable",
+    "jax_default_prng_impl",
+    "jax_default_matmul_precision",
+)
 _TRACED = ("jax", "jaxlib", "numpy", "numpyro", "equinox", "diffrax", "optimistix")
 
 
@@ -52,12 +59,20 @@ class _CachedJit:
         static = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
         folder = _setting("jax_compilation_cache_dir")
-        if folder is None or _needs_plain_jit(leaves):
+        if any(isinstance(leaf, Tracer) for leaf in leaves):
+            # Within another program: a trace that JAX kept for itself would outlive
+            # the code that it was made of.
+            return self._function(*args, **named, **static)
+        if folder is None or _needs_plain_jit():
             return self._jitted(*args, **named, **static)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
-        shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-        settings = jax.default_backend(), _setting("jax_enable_x64")
-        kind = structure, tuple(static.items()), shapes, settings
+        shapes = tuple(
+            (leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False))
+            for leaf in leaves
+        )
+        settings = [jax.default_backend(), os.environ.get("EQX_ON_ERROR")]
+        settings += map(_setting, _TRACE_SETTINGS)
+        kind = structure, tuple(static.items()), shapes, tuple(settings)
         if kind not in self._loaded:
             self._loaded[kind] = self._load(Path(folder), kind, leaves)
         loaded = self._loaded[kind]
@@ -85,10 +100,12 @@ class _CachedJit:
             return jax.jit(jax.export.deserialize(content).call)
         try:
             exported = jax.export.export(jax.jit(flat))(*leaves)
-            _write(file, exported.serialize())
-        except (ValueError, NotImplementedError, OSError):
+            content = exported.serialize()
+        except (ValueError, NotImplementedError):
             # Such as a result that holds classes, or a call back into Python.
             return None
+        with suppress(OSError):
+            _write(file, content)
         return jax.jit(exported.call)
 
 
@@ -97,16 +114,14 @@ def _setting(name: str) -> Any:
     return getattr(jax.config, name)
 
 
-def _needs_plain_jit(leaves: list) -> bool:
-    """Return whether a transformation or a debugging mode needs `jax.jit` itself."""
-    modes = "jax_disable_jit", "jax_debug_nans", "jax_debug_infs"
-    tracing = any(isinstance(leaf, Tracer) for leaf in leaves)
-    return tracing or any(map(_setting, modes))
+def _needs_plain_jit() -> bool:
+    """Return whether a debugging mode needs `jax.jit` itself."""
+    return any(map(_setting, ("jax_disable_jit", "jax_debug_nans", "jax_debug_infs")))
 
 
 def _write(file: Path, content: bytes | bytearray) -> None:
     """Write a file, whole or not at all."""
-    file.parent.mkdir(0o700, exist_ok=True)
+    file.parent.mkdir(0o700, parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=file.parent) as part:
         (Path(part) / file.name).write_bytes(content)
         os.replace(Path(part) / file.name, file)

@@ -9,6 +9,7 @@ from commands import Hdcal
 
 import hdcal
 from hdcal.calibration.straight_part import straight_check, takes_straight_part
+from hdcal.errors import InputError
 
 GEAR = {
     "theory": "spring",
@@ -110,6 +111,25 @@ def test_a_range_with_branches_on_two_lines_fails():
         kept = read(*two_branches(), range=remedy).records
         line = np.polyfit(kept.deformation, kept.force, 1)
         assert line[0] == pytest.approx(80.0, rel=0.01)
+
+
+def test_the_first_loading_is_taken_and_the_other_branch_is_not_predicted():
+    case = read(*two_branches(), range="straight")
+    x = np.asarray(case.records.deformation)
+    assert x[0] == 0.0 and x[-1] == pytest.approx(0.9, abs=0.03)
+    assert case.excluded_sense == 0  # the unloading lies elsewhere
+    # Of a friction loop both branches lie between the ends.
+    x, y = toe(contact=0.0)
+    y[:30] -= 10.0 * np.linspace(1.0, 0.0, 30)
+    back = 80.0 * x[::-1] - 8.0
+    case = read(np.r_[x, x[-2::-1]], np.r_[y, back[1:]], range="straight")
+    assert case.excluded_sense == -1 and "of one branch" in case.notes[-1]
+    posterior = hdcal.calibrate(case, warmup=300, draws=500)
+    assert hdcal.predict(posterior, [0.5], direction="up").direction == ["up"]
+    with pytest.raises(InputError, match="one branch"):
+        hdcal.predict(posterior, [0.5], direction="down")
+    with pytest.raises(InputError, match="one branch"):
+        hdcal.margin(posterior, 0.5, direction="down")
 
 
 def test_a_range_of_one_line_passes():

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.screening.result import LEAST_DIFFERENCE, StraightPart
+from hdcal.screening.result import LEAST_DIFFERENCE, NORMAL_95, StraightPart
 
 if TYPE_CHECKING:
     from hdcal.inference.checks import Check
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 # A testing machine of class 0.5 may err by this share of the force (ISO 7500-1): a
 # curve that bends by less is a straight line.
 _CLASS = 0.005
-_NORMAL_95 = 1.96
 
 
 def takes_straight_part(case: Case) -> bool:
@@ -69,4 +68,4 @@ def _part(case: Case) -> StraightPart | None:
 
 def _unsure(part: StraightPart, share: float) -> float:
     """Return the difference from a part's stiffness that counts [N/mm]."""
-    return max(_NORMAL_95 * part.slope_sd, share * abs(part.slope))
+    return max(NORMAL_95 * part.slope_sd, share * abs(part.slope))

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
@@ -10,6 +10,7 @@ import click
 
 from hdcal.data.plausible import RANGES
 from hdcal.errors import Finding, Findings, InputError
+from hdcal.quantities import Quantities
 
 T = TypeVar("T")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -63,6 +64,25 @@ def _refused(option: str, words: str, remedy: str) -> InputError:
     return InputError([Finding(option, words, remedy)])
 
 
+class InUnit(float):
+    """A number in N or mm that was written with its unit."""
+
+
+def unit_findings(units: Quantities, **given: float | None) -> Iterator[Finding]:
+    """Yield options that were written in N or mm where torques were measured.
+
+    Args:
+        units: of what was measured.
+        given: options by name.
+    """
+    for name, value in given.items():
+        if isinstance(value, InUnit) and not units.is_force:
+            words = f"is given in the unit of a force or a length, and {units.load}s "
+            words += f"over {units.displacement}s were measured"
+            here = f"{units.displacement_unit} or {units.load_unit}"
+            yield Finding(name, words, f"Write the number alone, in {here}")
+
+
 def read_quantity(text: str, option: str, *, unit: str) -> float:
     """Read a number, alone in a code unit or with a unit behind it: 70, 0.07 kN.
 
@@ -91,7 +111,7 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     if code != unit:
         words = f"'{text}' is not {kind}: its unit is that of {code}"
         raise _refused(option, words, remedy)
-    return number * factor
+    return InUnit(number * factor)
 
 
 def read_ends(text: str, option: str) -> tuple[float, float]:

@@ -104,6 +104,8 @@ class Case:
             empty unless `skip_bad` was given.
         excluded: deformations as read whose rows were left out because the part gave
             way, or for a working range: ends of each stretch [mm].
+        excluded_sense: sign of the movement whose readings were left out, where one
+            branch alone was chosen; 0 where none was.
         screening: of the whole record before rows were cut; None where the rows are
             not those of a file.
         units: names and units of force and deformation; of a torsional spring they
@@ -124,6 +126,7 @@ class Case:
     dates: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
     excluded: tuple[tuple[float, float], ...] = ()
+    excluded_sense: int = 0
     screening: Screening | None = None
     units: Quantities = FORCE
 

@@ -24,11 +24,11 @@ def require_scatter(case: Case) -> None:
     # Of many gears the first rows alone are at hand, or none of what is asked about.
     if not len(force):
         return
-    if np.max(np.abs(_beside_lines(records))) > _NOTHING * np.max(np.abs(force)):
+    if np.max(np.abs(left_of_lines(records, force))) > _NOTHING * np.max(np.abs(force)):
         return
     words = (
-        "the forces lie on a straight line to the last digit, so that nothing tells "
-        "how far readings scatter"
+        f"the {case.units.load}s lie on a straight line to the last digit, so that "
+        "nothing tells how far readings scatter"
     )
     members = len(np.unique(records.run)) + len(case.specimen_labels)
     if len(force) <= members:
@@ -36,10 +36,10 @@ def require_scatter(case: Case) -> None:
             "no reading is left over that tells how far readings scatter: each run has "
             "as few as its line and its zero need"
         )
-    remedy = (
-        "Say the step of the display as force_resolution_N under [measurement] of the "
-        "gear file; to readings that were computed, add noise"
-    )
+    remedy = "To readings that were computed, add noise"
+    if case.units.is_force:
+        remedy += ", or say the step of the display as force_resolution_N under "
+        remedy += "[measurement] of the gear file"
     raise InputError([Finding(case.name, words, remedy)])
 
 
@@ -61,12 +61,16 @@ def least_step(force) -> float:
     return float(np.min(steps)) if len(steps) else 0.0
 
 
-def _beside_lines(records: Records) -> np.ndarray:
-    """Return what a line of each specimen, with a zero of each run, leaves [N]."""
+def left_of_lines(records: Records, values: np.ndarray) -> np.ndarray:
+    """Return what a line of each specimen, with a zero of each run, leaves.
+
+    Args:
+        records: the rows.
+        values: over their deformation, shape (n,).
+    """
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
     x, y = (
-        less_run_means(np.asarray(values), run)
-        for values in (records.deformation, records.force)
+        less_run_means(np.asarray(each), run) for each in (records.deformation, values)
     )
     squares = np.bincount(specimen, x * x)
     slope = np.bincount(specimen, x * y) / np.where(squares > 0.0, squares, 1.0)

@@ -91,12 +91,6 @@ def verdict_document(
     )
 
 
-def _remarks(found: VerdictAnswer) -> list[Section]:
-    if not found.notes:
-        return []
-    return [Section("Remarks", [Sentences(found.notes)], True)]
-
-
 def _data(case: Case) -> Section:
     return Section("Data", [Facts(data_rows(case))], appendix=True)
 

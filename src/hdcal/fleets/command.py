@@ -4,7 +4,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import FORCE, LENGTH
+from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 from hdcal.cli.options import (
     case_options,
     folder_options,
@@ -78,7 +78,6 @@ def fleet(
     with console.wrong as wrong:
         wrong += implausible("seed", seed)
         wrong += implausible("force_tolerance", force_tolerance)
-        wrong += implausible("deformation", deformation)
         wrong += implausible("limit_force", limit_force, "sigma")
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
@@ -94,6 +93,8 @@ def fleet(
             if kept is not None and deformation is not None:
                 tested, case = kept[0].largest, kept[0].case
                 about = tested, case.gear.reach, case.units
+                given = {"deformation": deformation, "limit_force": limit_force}
+                wrong += unit_findings(case.units, **given)
                 wrong += deformation_findings(deformation, *about)
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)

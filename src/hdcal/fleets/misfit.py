@@ -7,7 +7,8 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.loading import loading_side
-from hdcal.data.records import Records, less_run_means
+from hdcal.data.records import Records
+from hdcal.data.scatter import left_of_lines
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.report.answer import Real
 
@@ -87,17 +88,8 @@ def beside_lines(records: Records) -> tuple[np.ndarray, np.ndarray]:
     x, y = side * np.asarray(records.deformation), side * np.asarray(records.force)
     scaled = x / np.max(np.abs(x))
     shapes = side * np.asarray(records.sense), scaled * np.abs(scaled)
-    shapes = [_beside_lines(records, each) for each in shapes]
-    return _beside_lines(records, y), np.stack(shapes)
-
-
-def _beside_lines(records: Records, values: np.ndarray) -> np.ndarray:
-    """Return what a straight line for each gear, with zeros for its runs, leaves."""
-    run, gear = np.asarray(records.run), np.asarray(records.specimen)
-    line = less_run_means(np.asarray(records.deformation), run)
-    left = less_run_means(values, run)
-    slope = np.bincount(gear, left * line) / np.bincount(gear, line**2)
-    return left - slope[gear] * line
+    shapes = [left_of_lines(records, each) for each in shapes]
+    return left_of_lines(records, y), np.stack(shapes)
 
 
 def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):

@@ -28,7 +28,7 @@ ONE_MOUNTING = (
 
 OF_SIZES = (
     "Gears are of several sizes: what is told of the population, of gears to come and "
-    "of forces is of a gear of the gear file's sizes."
+    "of {load}s is of a gear of the gear file's sizes."
 )
 ONE_SIZE = (
     "All gears are taken to be of the gear file's sizes: what sizes differ in counts "

@@ -59,9 +59,9 @@ class Pool:
         self.left_out = found.left_out | self.left_out
         self.notes += found.notes
         frame = found.frame
+        self._show([] if frame.empty else [found])
         if frame.empty:
             return
-        self._show([found])
         labels = frame[self.keys].astype(dict.fromkeys(self.keys[2:], str))
         of_row = labels.groupby(self.keys, sort=False, observed=True).ngroup()
         of_row, gear, read = of_row.to_numpy(), self.source.gear, found["deformation"]
@@ -78,7 +78,7 @@ class Pool:
             bad = part.frame["specimen"].isin([*self.left_out])
             part = part.where(~bad.to_numpy())
             room = _SHOWN - sum(len(one.frame) for one in self.shown)
-            if room > 0:
+            if room > 0 and len(part.frame):
                 self.shown.append(replace(part, frame=part.frame[:room]))
 
     def join(self, other: "Pool") -> None:
@@ -92,7 +92,7 @@ class Pool:
         """Return what all of them come to, without the gears that are left out.
 
         Raises:
-            InputError: none is left.
+            InputError: none is left, or none of the first rows.
         """
         table: Any = pd.concat([*self.parts, pd.DataFrame(columns=self.keys)])
         table = table[~table["specimen"].isin([*self.left_out])].reset_index(drop=True)
@@ -131,8 +131,14 @@ class Pool:
             table: labels of all rows, with the indexes of their gears and runs.
         """
         source, warm = self.source, self.source.gear.reference_temperature
+        self._show([])
+        if not self.shown:
+            words = f"the first {_SHOWN} rows are all of gears that are left out"
+            remedy = "Take these gears out of the file"
+            raise InputError(
+                [*self.left_out.values(), Finding(source.name, words, remedy)]
+            )
         found = joined(self.shown, warm, {})
-        found = found.where(~found.frame["specimen"].isin([*self.left_out]).to_numpy())
         found = replace(found, sha256=source.sha256, named=source.named)
         case = screened_case(found, None, source.gear, (), source.name)
         labels = found.frame[self.keys].astype(dict.fromkeys(self.keys, str))

@@ -79,7 +79,7 @@ def _still(readings: FleetReadings) -> dict[str, Finding]:
     case, sums = readings.case, readings.sums
     moved = np.bincount(sums.gear, sums.xx)
     still = moved <= _STILL * np.bincount(sums.gear, sums.rows * sums.x**2)
-    words = "was read at one deformation only in each of its runs"
+    words = f"was read at one {case.units.displacement} only in each of its runs"
     remedy = "Read it at two or more in one run, or leave it out"
     one = Finding(case.name, words, remedy)
     return {case.specimen_labels[gear]: one for gear in np.flatnonzero(still)}

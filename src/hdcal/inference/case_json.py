@@ -18,7 +18,7 @@ from hdcal.quantities import BY_LOAD, FORCE
 
 _ABOUT = (
     *("name", "run_labels", "specimen_labels", "data_sha256", "notes"),
-    "excluded",
+    *("excluded", "excluded_sense"),
 )
 
 

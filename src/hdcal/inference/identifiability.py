@@ -10,6 +10,7 @@ import numpy as np
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
 from hdcal.exported import jit
+from hdcal.inference.checks import listed
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.distributions import frozen, moments
 from hdcal.inference.padding import pad_records
@@ -89,7 +90,8 @@ def linearise(
     if 0 < problem.specimens <= _MOST_MEMBERS:
         scale = values["specimen_sd"]
         is_own = records.specimen[:, None] == np.arange(problem.specimens)
-        members.append(scale * stiffening[:, None] * is_own)
+        from_mean = is_own - 1.0 / problem.specimens
+        members.append(scale * stiffening[:, None] * from_mean)
         place.append(values["specimen_deviation"] / scale)
     if columns is not None:
         sizes = values["gap_sd"], values["gap_length"]
@@ -265,5 +267,5 @@ def _sentence(names: list[str]) -> str:
             "K and E0 cannot be told apart by this data; their product can, and with "
             "the prior of E0 that tells K"
         )
-    listed = ", ".join(names[:-1]) + " and " + names[-1]
-    return f"{listed} cannot be told apart by this data; one combination of them can"
+    every = listed(names)
+    return f"{every} cannot be told apart by this data; one combination of them can"

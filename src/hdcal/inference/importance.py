@@ -103,7 +103,7 @@ def sample_by_importance(
 ) -> ImportanceDraws | None:
     """Draw from a posterior with few parameters, in its whitened coordinates.
 
-    The proposals are worth at least as many independent draws as are kept.
+    The proposals are worth at least half as many independent draws as are kept.
 
     Args:
         problem: the inference problem, with every parameter among its coordinates.

@@ -132,7 +132,8 @@ def _sample_contact(problem: Problem, values: Mapping):
     coordinate of c is curved, and so would be the narrow ridge along which they trade.
     A gear that is both pressed and pulled shows ω₀ itself.
     """
-    pressed = jnp.mean(jnp.sign(problem.rows.deformation))
+    way = jnp.sign(problem.rows.deformation)
+    pressed = jnp.mean(way, where=measured(len(way), problem.count))
     taken_up = pressed * values[SLACK] / problem.reading.radial_per_read
     return sample_moved(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)
 

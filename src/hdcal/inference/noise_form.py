@@ -8,6 +8,7 @@ from scipy.special import ndtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
+from hdcal.data.scatter import left_of_lines
 from hdcal.exported import jit
 from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import previous_rows, whiten
@@ -23,6 +24,8 @@ _MOST_ALIKE = 0.95
 _REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
 # Probability that growth is found in noise of one size.
 _FALSE_ALARM = 0.05
+# Slopes of so many specimens have columns; of more each one's line is taken off first.
+MOST_SPECIMENS = 50
 _stop_cells = jit(stop_cells)
 
 
@@ -53,7 +56,9 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
     """
     scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
-    own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
+    specimens = np.unique(records.specimen)
+    many = len(specimens) > MOST_SPECIMENS
+    own = [] if many else [scaled * (records.specimen == i) for i in specimens]
     shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
     if with_loop:
         size = np.abs(scaled)
@@ -61,13 +66,16 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
         shapes += [*loop_cells(records, _REACHES)]
     run = np.asarray(records.run)
     *columns, force = (
-        less_run_means(np.asarray(values), run)
+        left_of_lines(records, np.asarray(values))
+        if many
+        else less_run_means(np.asarray(values), run)
         for values in (*own, *shapes, records.force)
     )
     design = np.array(columns).T
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
-    free = max(len(force) - int(np.max(run)) - 1 - int(rank), 1)
+    lines = len(specimens) if many else 0
+    free = max(len(force) - int(np.max(run)) - 1 - lines - int(rank), 1)
     return Pilot(residual, float(np.sqrt(residual @ residual / free)))
 
 

@@ -7,13 +7,12 @@ from scipy.optimize import least_squares
 
 from hdcal.data.records import Records, less_run_means
 from hdcal.inference.checks import Check
-from hdcal.screening.result import LEAST_DIFFERENCE
+from hdcal.screening.result import LEAST_DIFFERENCE, NORMAL_95
 
 # So many rows decide a line; of more every second, third, … is taken.
 _MOST_ROWS = 20_000
 # Residuals of normal noise have their median size at so many sds.
 _MEDIAN_SIZE = 0.6745
-_NORMAL_95 = 1.96
 
 
 class RobustLine(NamedTuple):
@@ -58,7 +57,7 @@ def robust_line(records: Records) -> RobustLine | None:
     weight = (1.0 + (residual / size) ** 2) ** -0.5
     spread = np.sum(weight * residual**2) / free
     inverse = np.linalg.pinv(design.T @ (weight[:, None] * design))
-    half = _NORMAL_95 * float(np.sqrt(spread * inverse[0, 0]))
+    half = NORMAL_95 * float(np.sqrt(spread * inverse[0, 0]))
     return RobustLine(float(found.x[0]) / span, half / span)
 
 

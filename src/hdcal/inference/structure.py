@@ -14,13 +14,14 @@ from scipy.special import logsumexp
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
+from hdcal.data.scatter import left_of_lines
 from hdcal.inference.discrepancy import (
     BASIS_SIZE,
     build_discrepancy,
     discrepancy_columns,
 )
 from hdcal.inference.distributions import frozen
-from hdcal.inference.noise_form import Pilot, pilot_fit
+from hdcal.inference.noise_form import MOST_SPECIMENS, Pilot, pilot_fit
 from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.physics.effect import Effect
@@ -44,8 +45,8 @@ _EITHER = (False, True)
 # leftover in noise sds, its length as quantiles of its prior.
 _CORRELATIONS, _LENGTHS = 8, 4
 _SIZES = np.logspace(-0.5, 3.0, 8)
-# Zeros and slopes of so many members have columns; of more runs the zeros are means.
-_MOST_MEMBERS = 50
+# Zeros of so many runs have columns; those of more are taken off as means.
+_MOST_RUNS = 50
 
 
 @dataclass(frozen=True)
@@ -92,9 +93,14 @@ def decide_structure(
         with_gap = False
     gaps = _EITHER if with_gap is None else (with_gap,)
     gap, tied = _best_form(case, bool(effects), gaps, ties)
+    coarse = _needs_exact_rounding(case, effects, noise_sd, gap)
+    if coarse != rounded:
+        # Beside a leftover the steps are taken for noise, which may be correlated.
+        rounded, reason = coarse, _why_independent(case, effects, coarse)
+        ties = (False,) if reason else (True,) if is_stated else _EITHER
+        gap, tied = _best_form(case, bool(effects), (gap,), ties)
     if not (reason or tied):
         reason = NONE_SHOWN
-    rounded = _needs_exact_rounding(case, effects, noise_sd, gap)
     return ModelStructure(noise_sd, rounded, gap, tied, reason)
 
 
@@ -226,14 +232,17 @@ def _base(records: Records, generous: bool) -> tuple[np.ndarray, np.ndarray]:
     )
     place = (place - place.mean()) / (np.ptp(place) or 1.0)
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
-    columns = [place * (specimen == i) for i in np.unique(specimen)[:_MOST_MEMBERS]]
+    specimens, runs = np.unique(specimen), np.unique(run)
+    many = len(specimens) > MOST_SPECIMENS
+    columns = [] if many else [place * (specimen == i) for i in specimens]
     if np.ptp(rise) > 0.0:
         # The modulus falls with the temperature; a drift of the zero is no part of it.
         columns += [rise * np.asarray(records.deformation)]
     if generous:
         columns += [place**2, place**3, np.asarray(records.sense, float), rise]
-    runs = np.unique(run)
-    if len(runs) <= _MOST_MEMBERS:
+    if many:
+        *columns, force = (left_of_lines(records, one) for one in (*columns, force))
+    elif len(runs) <= _MOST_RUNS:
         columns += [(run == i).astype(float) for i in runs]
     else:
         *columns, force = (less_run_means(values, run) for values in (*columns, force))

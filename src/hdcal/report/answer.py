@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 from hdcal.quantities import FORCE, Quantities
-from hdcal.report.result_schema import schema_with_units
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
+from hdcal.report.result_schema import DIALECT, schema_with_units
 
 
 class Promise:

@@ -16,6 +16,12 @@ _FEWEST = 5
 # A movement over this share of the range is a branch; from so many on they are cycles,
 # of which so many are looked at.
 _BRANCH, _CYCLES, _MOST_MOVEMENTS = 0.1, 3, 12
+# A run goes to both sides when it goes this share of one way the other way too.
+_BOTH_SIDES = 0.5
+# A hold has so many times as many rows of one reading as a movement.
+_HOLD = 3.0
+# A movement is large from this share of the largest force on.
+_LARGE = 0.5
 
 
 def name_segments(one: Run) -> None:
@@ -25,21 +31,28 @@ def name_segments(one: Run) -> None:
         return
     turns, sign = _branches(one, rows)
     x = one.x[rows]
-    way = 1 if x.max() - x[0] >= x[0] - x.min() else -1
+    # Loading is to the side on which the run goes farther; where it goes to both, up.
+    above, below = x.max() - x[0], x[0] - x.min()
+    way = -1 if above < _BOTH_SIDES * below else 1
     branch = np.searchsorted(turns, np.arange(rows.size), "left")
     up = sign * way * np.where(branch % 2, -1, 1) >= 0
     one.segment[rows] = np.where(up, LOADING, UNLOADING)
     still = np.diff(x, prepend=np.nan) == 0.0
+    # A coarse gauge repeats readings; a hold lasts for longer than it usually does.
+    starts = np.flatnonzero(~still)
+    length = np.diff(np.r_[starts, rows.size])
+    holds = length > _HOLD * np.median(length)
+    still &= np.repeat(holds, length)
     one.segment[rows[still]] = HOLDING
 
 
 def straight_part(one: Run, n: int) -> StraightPart | None:
-    """Return the longest straight part of a run's largest movement.
+    """Return the longest straight part of a run's first large movement.
 
-    Of cycles it is the largest movement that is straight as a whole, where at least
-    half of them are: one that yields once goes back and forth along another line. In
-    a loop none is straight, and the stiffness is that of all of it. Rows that only
-    repeat a reading add nothing to what is known.
+    That is the loading, as testing standards have it. Of cycles it is the largest
+    movement that is straight as a whole, where at least half of them are: a part that
+    yields once goes back and forth along another line. In a loop none is straight, and
+    the stiffness is that of all of it. Rows that only repeat a reading add nothing.
     """
     rows = one.distinct()
     if rows.size < _FEWEST:
@@ -54,6 +67,10 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
         pairs = [(b, s) for b, s in pairs if s.whole and b.size >= _SHOWN]
         if 2 * len(pairs) < len(branches):
             return None
+    else:
+        height = [abs(float(one.y[b[-1]] - one.y[b[0]])) for b in branches]
+        large = [i for i, h in enumerate(height) if h >= _LARGE * height[0]]
+        pairs = [pairs[min(large, key=lambda i: branches[i][0])]]
     branch, straight = pairs[0]
     part = branch[straight.rows]
     if not np.ptp(one.x[part]):
@@ -62,7 +79,11 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     inside = np.zeros(n, bool)
     inside[one.rows[one.with_repeats(part)]] = True
     slope, sd = _line(one.x[part], one.y[part], one.scatter)
-    sd *= math.sqrt(straight.inflation)
+    # Neighbours that err alike: of means of rows, beyond which the memory is small.
+    px, py = (_means(values[part], _edges_of(part.size)) for values in (one.x, one.y))
+    rows_each = part.size / px.size
+    of_means = _line(px, py, one.scatter / math.sqrt(rows_each))[1]
+    sd = max(sd, of_means) * math.sqrt(straight.inflation)
     whole = all(each.whole for each in found)
     return StraightPart(low, high, inside, slope, sd, whole)
 
@@ -147,9 +168,8 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
         points = min(points, int(fine ** (2.0 / 3.0)))
     if points < 2 * _FEWEST_POINTS:
         return Straight(slice(0, x.size), True)
-    edges = np.linspace(0, x.size, points + 1).astype(int)
-    size = np.diff(edges)
-    px, py = (np.add.reduceat(values, edges[:-1]) / size for values in (x, y))
+    edges = _edges_of(x.size, points)
+    px, py = _means(x, edges), _means(y, edges)
     span_x, span_y = np.ptp(px), np.ptp(py)
     if not span_x or not span_y:
         return Straight(slice(0, x.size), True)
@@ -165,6 +185,16 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
         first + (margin if first > 0 else 0), last - (margin if last < x.size else 0)
     )
     return Straight(inner, len(cuts) == 2, inflation)
+
+
+def _edges_of(rows: int, points: int = _POINTS) -> np.ndarray:
+    """Return where rows are parted into so many means, or as many as there are."""
+    points = min(points, rows)
+    return np.linspace(0, rows, points + 1).astype(int)
+
+
+def _means(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    return np.add.reduceat(values, edges[:-1]) / np.diff(edges)
 
 
 def _costs(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -201,7 +231,9 @@ def _pieces(x: np.ndarray, y: np.ndarray) -> tuple[list[int], float]:
     paid = _PARAMETERS * np.arange(1, _PIECES + 1)
     # dearer where few points are left to tell the noise
     criterion += paid * np.log(points) * points / np.maximum(points - paid - 1.0, 1.0)
-    return _edges(came, points, int(np.argmin(criterion)) + 1), inflation
+    chosen = _edges(came, points, int(np.argmin(criterion)) + 1)
+    # Fewer pieces follow less of the noise, and leave more of its memory to be seen.
+    return chosen, _inflation(x, y, chosen)
 
 
 def _edges(came: np.ndarray, points: int, count: int) -> list[int]:
@@ -221,7 +253,7 @@ def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int]) -> float:
     square = float(left @ left)
     r = float(left[1:] @ left[:-1]) / square if square else 0.0
     # Two parameters a piece make the residuals of independent noise alternate.
-    r += 2.0 * _PIECES / x.size
+    r += 2.0 * len(pieces) / x.size
     r = min(max(r, 0.0), 1.0 - 1.0 / x.size)
     return (1.0 + r) / (1.0 - r)
 

@@ -41,6 +41,8 @@ LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE, REPEATED =
 # Share by which stiffnesses differ at least: less matters to nobody, however well both
 # are known.
 LEAST_DIFFERENCE = 0.1
+# Half a 95 % interval of a normal distribution, in sds.
+NORMAL_95 = 1.96
 # First and last row of each stretch of rows.
 Stretches = tuple[tuple[int, int], ...]
 
@@ -145,6 +147,17 @@ class Screening:
             if left.size and left.min() < low:
                 found.append((-np.inf if without_end else float(left.min()), low))
         return tuple(found)
+
+    @property
+    def excluded_sense(self) -> int:
+        """Sign of the movement whose rows were left out between rows that stayed.
+
+        It is that of the other branches where one alone was chosen; 0 where none was.
+        """
+        x = self.deformation
+        kept, left = x[self.kept], x[self.segment == OUTSIDE]
+        between = (left > kept.min()) & (left < kept.max())
+        return -int(np.sign(kept[-1] - kept[0])) if between.any() else 0
 
     @property
     def asked(self) -> tuple[Observation, ...]:

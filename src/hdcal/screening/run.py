@@ -76,6 +76,8 @@ class Run:
     def distinct(self) -> np.ndarray:
         """Return the rows that are kept and do not just repeat the reading before."""
         rows = np.flatnonzero(self.kept)
+        if not rows.size:
+            return rows
         same = (np.diff(self.x[rows]) == 0.0) & (np.diff(self.y[rows]) == 0.0)
         return rows[np.r_[True, ~same]]
 

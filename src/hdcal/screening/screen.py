@@ -21,6 +21,8 @@ def screen(
     force: np.ndarray,
     time: np.ndarray | None = None,
     run: np.ndarray | None = None,
+    *,
+    whole: bool = True,
 ) -> Screening:
     """Look at a record: what of it is no curve of a part, and what was done about it.
 
@@ -29,6 +31,8 @@ def screen(
         force: as read [N], shape (n,).
         time: as read [s], shape (n,); None when not measured.
         run: index of the mounting, shape (n,); by default one.
+        whole: whether these are all runs. Of some of them nobody knows whether the sign
+            is opposite in every run, so that it is asked about and not turned.
     """
     x, y = np.array(deformation, float), np.array(force, float)
     n = x.size
@@ -38,12 +42,12 @@ def screen(
     cuts = np.flatnonzero(np.diff(index[order])) + 1
     runs = []
     plain = plain_runs(x, y, index)
-    for rows in np.split(order, cuts):
+    for rows in np.split(order, cuts) if n else []:
         one = Run.of(rows, x, y, clock_read, int(index[rows[0]]))
         one.plain = bool(plain[one.index])
         look_at(one)
         runs.append(one)
-    _signs(runs)
+    _signs(runs, whole=whole)
     for one in runs:
         name_segments(one)
     return _gathered(runs, n, clock_read)
@@ -74,13 +78,13 @@ def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
     )
 
 
-def _signs(runs: list[Run]) -> None:
+def _signs(runs: list[Run], *, whole: bool) -> None:
     """Turn the force where it is counted the other way in every run.
 
     What comes after the largest force is cut first: there the force falls.
     """
     signs = [_sign(one) for one in runs]
-    turned = {*signs} - {"unknown"} == {"opposite"}
+    turned = whole and {*signs} - {"unknown"} == {"opposite"}
     for one, sign in zip(runs, signs, strict=True):
         if sign == "same" or (sign == "unknown" and not turned):
             continue

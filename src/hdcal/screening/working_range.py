@@ -35,11 +35,13 @@ class WorkingRange:
         high: upper end.
         unit: mm of the deformation as read, or % of the largest force of a run; or
             `straight` where the longest straight part sets the ends.
+        one_branch: whether rows of other branches lie between the ends, and are cut.
     """
 
     low: float
     high: float
     unit: Literal["mm", "%", "straight"]
+    one_branch: bool = False
 
     def words(self, units: Quantities) -> str:
         """Return the range in words."""
@@ -48,7 +50,8 @@ class WorkingRange:
         if self.unit == "%":
             ends = f"{self.low:g} to {self.high:g} %"
             return f"{ends} of the largest {units.load}"
-        return f"{self.low:g} to {self.high:g} {units.displacement_unit}"
+        ends = f"{self.low:g} to {self.high:g} {units.displacement_unit}"
+        return f"{ends} of one branch" if self.one_branch else ends
 
     def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Tell which rows of a run lie in the range.
@@ -103,7 +106,9 @@ def in_range(
     """
     part = screening.straight
     if wanted.unit == STRAIGHT and part is not None:
-        wanted, inside = WorkingRange(part.low, part.high, "mm"), part.rows
+        inside, x = part.rows, screening.deformation
+        others = screening.kept & ~inside & (x >= part.low) & (x <= part.high)
+        wanted = WorkingRange(part.low, part.high, "mm", bool(others.any()))
         part = None
     else:
         inside = np.zeros(run.size, bool)

@@ -10,7 +10,6 @@ from hdcal.data.full_scale import scale_of
 from hdcal.data.gear import at_full_scale
 from hdcal.data.gear_file.rig_facts import correlation_prior
 from hdcal.data.loading import Motion, derive_motion
-from hdcal.data.measurements.deformation_scatter import without_scatter
 from hdcal.data.measurements.labels import further_labels
 from hdcal.data.measurements.measurements import Measurements
 from hdcal.data.measurements.notes import (
@@ -32,6 +31,8 @@ from hdcal.screening.result import Screening
 
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 _CORRELATION = "noise_correlation"
+# What a gear file says of the rig that presses, and not of one that twists.
+_OF_FORCE = ("deformation", "force_calibration", "deformation_calibration")
 
 
 def case_of(
@@ -55,6 +56,8 @@ def case_of(
     Raises:
         InputError: as `screened`.
     """
+    if measured.units == TORQUE:
+        _require_torsion(gear, name)
     wanted = asked_range(range or gear.source.get("measurement", {}).get("range"))
     before = gear_notes(gear, measured["force"])
     notes = [*notes, *before, *temperature_note(measured.get("temperature"))]
@@ -83,14 +86,11 @@ def screened_case(
     (specimen, gears), (run, runs) = measured.gears, measured.runs
     motion = _motion(measured, run, screening)
     further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
-    of_record = [*resets_note(motion, measured.rows)]
+    of_record = [*resets_note(motion, measured.rows, measured.units)]
     mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
     of_record += mountings_note(measured.stated, mounted, len(gears))
     of_record += rigs_note(measured.get("rig", ()), len(gears))
     of_record += [] if screening is None else screening_notes(screening, measured.units)
-    if screening is not None and screening.deformation_sd > 0.0:
-        moved, force = without_scatter(measured["deformation"], measured["force"], run)
-        measured = measured.assign(deformation=moved, force=force)
     x, force = measured["deformation"], measured["force"]
     shipped = rig_priors()[_CORRELATION].source
     if gear.scale_priors[_CORRELATION].source == shipped:
@@ -116,6 +116,7 @@ def screened_case(
         columns=measured.named,
         left_out=measured.left_out,
         excluded=screening.excluded if cut and screening is not None else (),
+        excluded_sense=screening.excluded_sense if cut and screening is not None else 0,
         screening=screening,
         units=measured.units,
         **further,
@@ -132,9 +133,10 @@ def _require_torsion(gear: Gear, name: str) -> None:
         words = f"torques over angles are no readings of the theory {gear.theory}"
         remedy = "Leave the gear file out, or state the theory spring in it"
         raise InputError([Finding(name, words, remedy)])
-    stated = gear.source.get("measurement", {})
-    lengths = [key for key in stated if key.endswith(("_N", "_mm", "_calibration"))]
-    wrong = [*lengths, *(key for key in ("priors", "rig") if key in gear.source)]
+    tables = (gear.source.get(name, {}) for name in ("gear", "measurement"))
+    stated = [key for table in tables for key in table]
+    wrong = [key for key in stated if key.endswith(("_N", "_mm")) or key in _OF_FORCE]
+    wrong += [key for key in ("priors", "rig") if key in gear.source]
     if wrong:
         words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
         words += "and the readings are torques over angles"

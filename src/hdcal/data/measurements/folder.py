@@ -36,12 +36,10 @@ class _Part:
     """What one file holds.
 
     Attributes:
-        label: of its gear, where the file names none.
         measured: what was read, its specimens named.
         gear: as the file beside it says; None where each has none.
     """
 
-    label: str
     measured: Measurements
     gear: Gear | None
 
@@ -102,10 +100,12 @@ def read_gear_folder(
             mine = named if here is None else here.source.get("columns", {}) | named
             how: dict = {"gear": here, "skip_bad": skip_bad or None}
             measured = each.attempt(read_measurements, file, mine, encoding, **how)
+            if measured is not None and parts:
+                each += _other_kind(measured, parts[0].measured)
             if each:
                 unread[label] = each
             elif measured is not None:
-                parts.append(_Part(label, _labelled(measured, label), its))
+                parts.append(_Part(_labelled(measured, label), its))
         wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert found is not None
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
@@ -161,8 +161,17 @@ def joined(
         hashlib.sha256(hashes.encode()).hexdigest(),
         frozenset().union(*(part.stated for part in parts)),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        named=parts[0].named,
         left_out={**bad, **left_out},
+        units=parts[0].units,
     )
+
+
+def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
+    """Yield a finding where a file holds torques and the first one forces, or not."""
+    if one.units != first.units:
+        words = f"holds {one.units.load}s, and {first.file} {first.units.load}s"
+        yield Finding(one.file, words, "Keep files of one kind in a folder")
 
 
 def _unread(

@@ -13,6 +13,7 @@ from hdcal.data.tables.headers import LABELS, parse_header
 from hdcal.data.tables.named_columns import Column
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted
+from hdcal.quantities import Quantities
 
 # How a note begins that says what was assumed.
 ASSUMED = "ASSUMED: "
@@ -111,19 +112,20 @@ def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
         )
 
 
-def resets_note(motion: Motion, rows: np.ndarray) -> Iterator[str]:
+def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator[str]:
     """Yield that the deformation was reset.
 
     Args:
         motion: of the readings.
         rows: what each is called in its source, shape (n,).
+        units: of what was measured.
     """
     if motion.resets:
         few = [str(rows[row]) for row in motion.resets[:MOST_ROWS]]
         more = ", …" if len(motion.resets) > MOST_ROWS else ""
         yield (
-            f"the deformation goes back over most of its range in one step (row "
-            f"{', '.join(few)}{more}), which counts as no measured "
+            f"the {units.displacement} goes back over most of its range in one step "
+            f"(row {', '.join(few)}{more}), which counts as no measured "
             "unloading. Where a new mounting begins there, say so in a column `run`"
         )
 

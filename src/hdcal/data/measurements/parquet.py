@@ -150,6 +150,7 @@ def read_batches(
     headers = [names[column.position] for column in source.used.values()]
     places = {q: place for place, q in enumerate(source.used)}
     used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
+    wanted = asked_range(source.range)
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
             grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
@@ -157,7 +158,6 @@ def read_batches(
             how: dict = {"skip_bad": skip_bad, "whole": False}
             found = measured_in(table, used, findings, source.gear, **how)
         if len(found.frame):
-            wanted = asked_range(source.range)
             found, screening = screened(found, wanted, skip_bad, whole=False)
             found = replace(found, notes=tuple(screening_notes(screening, found.units)))
         yield found

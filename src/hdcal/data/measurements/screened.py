@@ -2,7 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from hdcal.data.measurements.bad_gears import among, offer
+from hdcal.data.measurements.deformation_scatter import without_scatter
 from hdcal.data.measurements.measurements import FEWEST_ROWS, Measurements
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import Quantities
@@ -55,15 +58,15 @@ def screened(
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
     units = measured.units
-    found = screen(x, measured["force"], measured.get("time"), run)
+    found = screen(x, measured["force"], measured.get("time"), run, whole=whole)
     if found.asked:
         gears = measured["specimen"]
-        bad = {
-            str(gears[one.rows[0][0]]): Finding(
-                measured.file, *question(one, rows, units)
-            )
-            for one in found.asked
-        }
+        questions = [
+            Finding(measured.file, *question(one, rows, units)) for one in found.asked
+        ]
+        bad: dict[str, Finding] = {}
+        for one, finding in zip(found.asked, questions, strict=True):
+            bad.setdefault(str(gears[one.rows[0][0]]), finding)
         many = len({*gears})
         if skip_bad and (len(bad) < many or not whole):
             left = measured.where(~among(gears, bad))
@@ -71,10 +74,11 @@ def screened(
             return screened(left, wanted, whole=whole)
         offered = skip_bad is False and (len(bad) < many or not whole)
         offers = [offer(bad, many if whole else None)] if offered else []
-        raise InputError([*bad.values(), *offers])
+        raise InputError([*questions, *offers])
     if wanted is not None:
         if wanted.unit == STRAIGHT and found.straight is None:
-            words = "is straight, and the data are no single run with a straight part"
+            words = "is straight, and the data are of several runs, or of cycles whose "
+            words += "movements are no straight lines"
             raise InputError([Finding("range", words, FORM)])
         found = in_range(found, wanted, run, units)
     observations = tuple(
@@ -92,7 +96,27 @@ def screened(
     moved = {"deformation": found.deformation, "force": found.force, "zero": found.zero}
     if found.time is not None:
         moved["time"] = found.time
-    return measured.assign(**moved).where(found.kept), found
+    kept_rows = measured.assign(**moved).where(found.kept)
+    return _without_scatter(kept_rows, run[found.kept], found), found
+
+
+def _without_scatter(
+    measured: Measurements, run: np.ndarray, found: Screening
+) -> Measurements:
+    """Return rows without the scatter of the deformation, of runs that show it.
+
+    Args:
+        measured: the rows that are kept.
+        run: index of the mounting as screened, shape (n,).
+        found: their screening.
+    """
+    x, force = measured["deformation"].copy(), measured["force"].copy()
+    shaken = {o.run for o in found.observations if o.action == "smoothed"}
+    for index in shaken:
+        rows = np.flatnonzero(run == index)
+        zero = measured["zero"][rows]
+        x[rows], force[rows] = without_scatter(x[rows], force[rows], zero)
+    return measured.assign(deformation=x, force=force) if shaken else measured
 
 
 def screening_notes(found: Screening, units: Quantities) -> list[str]:

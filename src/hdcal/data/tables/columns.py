@@ -60,6 +60,10 @@ def choose_columns(
             "torque" in mapping or chooser.is_torsion()
         )
         others = ("deformation", "force", "force_sd") if turning else ("torque",)
+        for name in filter(mapping.__contains__, others):
+            words = f"`columns` {name}=… is of another kind of test than "
+            words += "torque and angle" if turning else "force and deformation"
+            findings.add(words, "Name columns of one kind of test", table.header_row)
         quantities = [name for name in quantities if name not in others]
         required = _TURNING if turning else required
     for quantity in quantities:

@@ -7,6 +7,7 @@ import click
 
 from hdcal.cli.command import Command
 from hdcal.cli.console import Console
+from hdcal.cli.option_types import unit_findings
 from hdcal.cli.options import is_given
 from hdcal.errors import Finding
 from hdcal.prediction.margin.command import margin as of_models
@@ -51,7 +52,8 @@ def _of_fleet(console: Console, run: str, out, force, deformation, **asked):
             wrong += _other_seed(asked["seed"], posterior.facts.settings.seed)
             how: dict[str, Any] = {"confidence": asked["confidence"]}
             how |= {"content": asked["content"]} if is_given("content") else {}
-            limit = asked["limit_force"]
+            limit, units = asked["limit_force"], posterior.facts.quantities
+            wrong += unit_findings(units, deformation=deformation, limit_force=limit)
             # What is no number was told while the options were read.
             if deformation is not None:
                 found = wrong.attempt(posterior.next_force, deformation, limit, **how)

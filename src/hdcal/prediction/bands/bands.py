@@ -243,7 +243,10 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
         find("deformation", problem, "Give it in mm")
     else:
         findings += far_findings(worst, float(np.max(np.abs(tested))), unit=unit)
-        each = (excluded_findings(cause.posterior.case, one) for one in deformation)
+        loads = _loading(deformation, case.records)
+        sense = loads if direction is None else 0.0 * loads + SENSE.get(direction, 0.0)
+        pairs = zip(deformation, sense, strict=True)
+        each = (excluded_findings(case, *pair) for pair in pairs)
         findings += next(filter(None, each), [])
     if temperature.size == 0:
         find("temperature", "is empty", "give numbers in °C")
@@ -296,6 +299,7 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
         predict(models, grid, levels, side, interval=interval, allow_failed=True)
         for side in DIRECTIONS
         if SENSE[side] in np.asarray(records.sense)
+        and SENSE[side] != case.excluded_sense
     ]
     tables = {n: np.concatenate([getattr(p, n) for p in parts]) for n in COLUMNS}
     return Bands(**tables, units=case.units)

@@ -170,13 +170,20 @@ def far_findings(
     return [Finding("deformation", words, f"Give it in {unit}")]
 
 
-def excluded_findings(case: Case, deformation: float) -> list[Finding]:
+def excluded_findings(case: Case, deformation: float, sense: float) -> list[Finding]:
     """Return a finding where rows were read and left out, or the part had given way.
 
     Args:
         case: that was calibrated.
         deformation: as given [mm].
+        sense: sign of the movement as read.
     """
+    if case.excluded_sense and sense == case.excluded_sense:
+        way = "rises" if sense > 0.0 else "falls"
+        words = f"readings while the {case.units.displacement} {way} were left out, as "
+        words += "the stiffness is that of one branch"
+        remedy = "Ask for the other direction, or calibrate with the range all"
+        return [Finding("direction", words, remedy)]
     if not any(low < deformation < high for low, high in case.excluded):
         return []
     tested, unit = np.asarray(case.records.deformation), case.units.displacement_unit

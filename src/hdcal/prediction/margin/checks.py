@@ -12,6 +12,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.causes import Cause, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
+    SENSE,
     excluded_findings,
     level_findings,
     slip_findings,
@@ -58,7 +59,8 @@ def check_margin(
     forces = {"limit_force": limit, "given_force": request.given_force}
     draws = sum(min(c.size, MOST_DRAWS) for c in causes)
     more = ", or calibrate with more draws" if draws < MOST_DRAWS else ""
-    wrong = _check_deformation(cause, at)
+    movement = sense * SENSE.get(request.direction, 0.0)
+    wrong = _check_deformation(cause, at, movement)
     findings = [
         *wrong,
         *_check_temperature(cause, temperature),
@@ -123,7 +125,9 @@ def check_sign(
     raise InputError([Finding("limit_force", words, remedy)])
 
 
-def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
+def _check_deformation(
+    cause: Cause, deformation: float, movement: float
+) -> list[Finding]:
     gear, units = cause.posterior.case.gear, cause.posterior.case.units
     if wrong := implausible("deformation", deformation, units.displacement):
         return wrong
@@ -134,7 +138,7 @@ def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
     if abs(deformation) >= gear.reach:
         words = f"{deformation:g} mm on a radius of {gear.geometry.radius:g} mm"
         return [Finding("deformation", words, "Give it in mm")]
-    return excluded_findings(cause.posterior.case, deformation)
+    return excluded_findings(cause.posterior.case, deformation, movement)
 
 
 def _check_choices(request: MarginRequest, criteria: Criteria) -> list[Finding]:

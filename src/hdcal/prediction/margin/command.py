@@ -7,7 +7,7 @@ import click
 from hdcal.cli import options
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import FORCE, LENGTH, WINDOW
+from hdcal.cli.option_types import FORCE, LENGTH, WINDOW, unit_findings
 
 
 @command(
@@ -72,9 +72,14 @@ def margin(console: Console, run, out, force, certificate, **asked):
         models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
         wrong += options.needs_folder("certificate", certificate, out)
-    assert models is not None
+        posterior = None
+        if models is not None:
+            posterior = max(model_pairs(models), key=lambda model: model[0])[1]
+            names = "deformation", "limit_force", "given_force"
+            given = {name: asked[name] for name in names if name in asked}
+            wrong += unit_findings(posterior.case.units, **given)
+    assert models is not None and posterior is not None
     found = bounds_of(models, **asked)
-    posterior = max(model_pairs(models), key=lambda model: model[0])[1]
     signed = date.today() if certificate else None
     how = {"seed": asked["seed"], "certificate": signed}
     return console.report(margin_report(found, posterior, console.command, **how))

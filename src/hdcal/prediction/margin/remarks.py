@@ -30,7 +30,7 @@ _GAUGES = {
     "temperature_offset": "the thermometer",
 }
 _CERTIFIED = (
-    "The load is that at a true deformation and temperature: the certificates of "
+    "The load is that at a true {{displacement}} and temperature: the certificates of "
     "{which} widen it, and not a reading."
 )
 _NOT_CERTIFIED = (
@@ -41,7 +41,7 @@ _ZERO = (
     "What the gauge shows without a load rests on its prior, not on these data: it is "
     "known to {sd:.2g} {{N}} (sd) and makes a load uncertain over some {both:.2g} "
     "{{N}}. Read the gauge with the gear out of contact, and state that zero as the "
-    "prior of the force offset."
+    "prior of the {{load}} offset."
 )
 _LOAD_OF_MOUNTINGS = (
     "Mountings differ by the gauge's zero, which is no load: here they are alike."
