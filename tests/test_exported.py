@@ -23,6 +23,13 @@ def power(tree, x, *, degree):
     return {"value": tree["a"] * x**degree, "pair": (x, tree["b"])}
 
 
+FACTOR = 1.0
+
+
+def scaled(x):
+    return FACTOR * x
+
+
 TREE = {"a": np.array([1.0, 2.0]), "b": 3.0}
 X = np.array([0.5, 2.0])
 # Another process: how often it traces, and what comes out.
@@ -115,6 +122,15 @@ jax.tree_util.register_pytree_node(Foreign, lambda f: ((1.0,), None), lambda *_:
 def test_code_that_is_in_no_digest_is_not_kept(folder: Path):
     assert float(jit(lambda own: jnp.sum(jnp.ones(3)))(Foreign())) == 3.0
     assert not kept(folder)
+
+
+def test_within_another_program_nothing_is_kept(monkeypatch: pytest.MonkeyPatch):
+    """Code that has changed is traced anew by the next program that holds it."""
+    monkeypatch.setattr(sys.modules[__name__], "FACTOR", 2.0)
+    inner = jit(scaled)
+    assert jax.jit(lambda x: inner(x) + 0.0)(1.0) == 2.0
+    monkeypatch.setattr(sys.modules[__name__], "FACTOR", 3.0)
+    assert jax.jit(lambda x: inner(x) + 1.0)(1.0) == 4.0
 
 
 def test_transformations_pass_through():

@@ -12,15 +12,17 @@ from jsonschema import Draft202012Validator
 import hdcal
 from hdcal.calibration.calibration import Calibration, calibration_of
 from hdcal.calibration.check.check import check
+from hdcal.cli.option_types import read_quantity, unit_findings
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.summary import verdict_report
 from hdcal.errors import InputError
 from hdcal.fleets.answer import FleetAnswer
+from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.summary import fleet_report
 from hdcal.prediction.bands.summary import prediction_answer
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.summary import margin_report
-from hdcal.quantities import TORQUE
+from hdcal.quantities import FORCE, TORQUE
 from hdcal.report.answer import json_schema
 from hdcal.report.plain import as_json
 from hdcal.report.write import report_files
@@ -187,6 +189,48 @@ def test_a_gear_file_of_forces_is_refused(case):
     sized = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
     with pytest.raises(InputError, match="theory"):
         hdcal.read_case(table, sized)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "name"),
+    [({"radius_mm": 40.0}, "radius_mm"), ({"deformation": "diametral"}, "deformation")],
+)
+def test_a_torsional_spring_has_no_radius_and_no_diameter(case, sizes, name):
+    table = _readings(1.0, 1.0, "torque_Nm", "angle_rad")
+    with pytest.raises(InputError, match=name):
+        hdcal.read_case(table, {"theory": "spring", **sizes})
+
+
+def test_many_files_and_parquet_keep_their_quantities(tmp_path):
+    table = pd.DataFrame(_readings(1.0, ARCMIN, "Torque [Nm]", "Twist [arcmin]"))
+    folder = tmp_path / "gears"
+    folder.mkdir()
+    for name in "abc":
+        table.to_csv(folder / f"{name}.csv", index=False)
+    gears = [table.assign(serial=name) for name in "abc"]
+    pd.concat(gears).to_parquet(tmp_path / "line.parquet", index=False)
+    for source in (folder, tmp_path / "line.parquet"):
+        found = read_fleet(source)
+        assert found.case.units is TORQUE
+        slopes = found.sums.xy / found.sums.xx
+        assert np.max(found.case.records.deformation) < 12.01 * ARCMIN
+        assert slopes == pytest.approx(STIFFNESS, rel=0.02)
+    forces = {
+        "deformation_mm": range(6),
+        "force_N": [0.0, 20.1, 39.9, 60.2, 80.0, 99.8],
+    }
+    pd.DataFrame(forces).to_csv(folder / "d.csv", index=False)
+    with pytest.raises(InputError, match="holds forces"):
+        read_fleet(folder)
+
+
+def test_a_length_with_its_unit_is_no_angle():
+    given = {"deformation": read_quantity("0.4 mm", "--deformation", unit="mm")}
+    (finding,) = unit_findings(TORQUE, **given)
+    assert finding.where == "deformation"
+    assert not [*unit_findings(FORCE, **given)]
+    alone = read_quantity("0.004", "--deformation", unit="mm")
+    assert not [*unit_findings(TORQUE, deformation=alone)]
 
 
 def test_a_margin_is_of_torques(posterior):

@@ -310,12 +310,31 @@ def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch, batch):
     force = 100.0 * table["deformation_mm"] + rng.normal(0.0, 0.1, gears * rows)
     force[70] += 60.0
     force[2 * rows + 30 : 3 * rows] -= 40.0
+    table = table.assign(lot="A", operator="Kim", rig="R", date="2026-04-01")
     table.assign(force_N=force).to_parquet(tmp_path / "line.parquet", index=False)
     found = read_fleet(tmp_path / "line.parquet")
     whole = read_fleet(table.assign(force_N=force))
-    same_sums = [np.sort(one.sums.xy) for one in (found, whole)]
-    assert same_sums[0] == pytest.approx(same_sums[1], rel=1e-9)
     assert len(found.runs) == len(whole.runs) == gears + 1
+    same(found, whole)
     assert np.bincount(found.sums.gear, found.sums.rows).tolist() == [60, 59, 60, 60]
     part = read_fleet(tmp_path / "line.parquet", range="0.2:0.8")
     assert part.case.records.deformation.max() <= 0.8
+    same(part, read_fleet(table.assign(force_N=force), range="0.2:0.8"))
+
+
+@pytest.mark.parametrize("batch", [60, 1 << 18])
+def test_a_gear_of_opposite_sign_is_asked_about_or_left_out(
+    tmp_path, monkeypatch, batch
+):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
+    rng = np.random.default_rng(5)
+    x = np.tile(np.linspace(0.0, 1.0, 60), 4)
+    table = pd.DataFrame({"serial": np.repeat(["A", "B", "C", "D"], 60)})
+    sign = np.where(table["serial"] == "B", -1.0, 1.0)
+    force = 100.0 * sign * x + rng.normal(0.0, 0.1, len(x))
+    table = table.assign(deformation_mm=x, force_N=force)
+    table.to_parquet(tmp_path / "line.parquet", index=False)
+    assert "'B'" in wrong(tmp_path / "line.parquet")
+    found = read_fleet(tmp_path / "line.parquet", skip_bad=True)
+    assert set(found.case.left_out) == {"B"}
+    assert np.all(found.sums.xy > 0.0) and len(found.runs) == 3

@@ -7,6 +7,7 @@ import pytest
 
 import hdcal
 from hdcal.data.prior import Prior
+from hdcal.inference.noise_form import pilot_fit
 from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.physics.registry import EFFECTS
 
@@ -57,6 +58,29 @@ def test_a_bend_is_not_fitted_beside_effects_or_few_rows():
     assert not decide_structure(bent, [EFFECTS["progressive_stiffening"]]).with_gap
     assert not decide_structure(case(20.0, 0.0, 0, rows=40)).with_gap
     assert decide_structure(bent, [EFFECTS["hysteresis"]], with_gap=True).with_gap
+
+
+def test_beside_a_bend_coarse_steps_may_hold_correlated_noise():
+    """The steps are 0.7 noise sds: beside a bend they count as noise."""
+    gear, step = {**SPRING, "force_resolution_N": 0.7}, 0.7
+    for seed in range(5):
+        bent = case(20.0, 0.8, seed).records
+        force = np.round(np.asarray(bent.force) / step) * step
+        table = {"deformation_mm": np.asarray(bent.deformation), "force_N": force}
+        found = decide_structure(hdcal.read_case(table, gear=gear))
+        assert found.with_gap and found.correlated and not found.rounded
+
+
+def test_many_specimens_have_a_line_each():
+    """The noise is that about sixty lines, and not the scatter of the slopes."""
+    rng, gears, rows = np.random.default_rng(4), 60, 20
+    x = np.tile(np.linspace(0.0, 1.0, rows), gears)
+    slopes = np.repeat(rng.normal(100.0, 10.0, gears), rows)
+    table = {"deformation_mm": x, "force_N": slopes * x + rng.normal(size=x.size)}
+    table["specimen"] = np.repeat(np.arange(gears), rows).astype(str)
+    many = hdcal.read_case(table, gear=SPRING)
+    assert pilot_fit(many.records).noise_sd == pytest.approx(1.0, rel=0.06)
+    assert not decide_structure(many).with_gap
 
 
 def test_a_posterior_keeps_its_structure():

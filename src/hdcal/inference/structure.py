@@ -246,8 +246,9 @@ def _base(records: Records, generous: bool) -> tuple[np.ndarray, np.ndarray]:
         columns += [(run == i).astype(float) for i in runs]
     else:
         *columns, force = (less_run_means(values, run) for values in (*columns, force))
-    left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-    return left[:, size > 1e-10 * size[0]], force
+    table = np.reshape(columns, (-1, len(force))).T
+    left, size, _ = np.linalg.svd(table, full_matrices=False)
+    return left[:, size > 1e-10 * size.max(initial=0.0)], force
 
 
 def _quantiles(prior, name: str, count: int) -> np.ndarray:
