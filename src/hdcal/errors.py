@@ -1,7 +1,7 @@
 """The errors a user can meet: every one carries words, none needs a traceback."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import ParamSpec, Self, TypeVar
 
@@ -66,6 +66,13 @@ def ended(text: str) -> str:
 def quoted(name: str) -> str:
     """Return a name from a file in quotes, as findings show it."""
     return f"'{_shown(name, _LONGEST_NAME)}'"
+
+
+def listed(items: Sequence[object], most: int) -> str:
+    """Return the first items, and how many more there are: 'a, b and 3 more'."""
+    more = len(items) - most
+    first = ", ".join(str(item) for item in items[:most])
+    return f"{first} and {more} more" if more > 0 else first
 
 
 def _shown(text: str, longest: int) -> str:

@@ -228,12 +228,7 @@ def _named_material(
 
 
 def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:
-    """Priors of the table [priors]; those of effects are named `effect.parameter`.
-
-    Args:
-        toml: the gear file.
-        theory: overrides that of the file.
-    """
+    """Priors of the table [priors]; those of effects are named `effect.parameter`."""
     table = _in_table(toml, "priors")
     stated = _in_table(toml, "gear").get("theory") or "ring"
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS

@@ -59,19 +59,7 @@ def sense_at_turns(
 
 
 def _two_branches(x: np.ndarray, y: np.ndarray, at: np.ndarray, size: int):
-    """Return what two branches leave of the force at the row between them.
-
-    Args:
-        x: deformation.
-        y: force.
-        at: turning rows, shape (t,).
-        size: rows taken from each branch.
-
-    Returns:
-        Errors of the prediction from before and from after the turn, over their
-        standard errors for a noise of one, shape (2, t); the sum of squares that the
-        branches leave; and its degrees of freedom.
-    """
+    """Return what two branches leave of the force at the row between them."""
     steps = np.concatenate([np.arange(-size, 0), np.arange(1, size + 1)])
     near = at[:, None] + steps
     u = x[near] - x[at][:, None]

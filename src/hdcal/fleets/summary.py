@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
+from hdcal.errors import listed
 from hdcal.evidence.prepare import moments
 from hdcal.fleets.answer import (
     FleetAnswer,
@@ -214,13 +215,12 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
         )
     far = np.array(found.case.specimen_labels)[_in_another_unit(found)].tolist()
     if far:
-        more = f" and {len(far) - 1} more" * (len(far) > 1)
-        parts.append(f"See in which units {far[0]}{more} was read: not in the others'")
-    if again := [name for name in called if name not in {*with_more, *far}]:
-        more = f" and {len(again) - 1} more" * (len(again) > 1)
         parts.append(
-            f"Mount {again[0]}{more} anew and measure again before you act on this"
+            f"See in which units {listed(far, 1)} was read: not in the others'"
         )
+    if again := [name for name in called if name not in {*with_more, *far}]:
+        words = "anew and measure again before you act on this"
+        parts.append(f"Mount {listed(again, 1)} {words}")
     misfit = found.misfit
     beside = misfit.loop_N or misfit.bend_N or misfit.correlation
     if beside or bent.any():

@@ -146,14 +146,7 @@ def read_prior(
 
 
 def _check_numbers(prior: Prior, quantity: str, key: str, toml: TomlFile) -> None:
-    """Refuse numbers that no gear and no rig can have.
-
-    Args:
-        prior: in code units.
-        quantity: a key of `RANGES` or `NAMES`.
-        key: of the prior.
-        toml: its file.
-    """
+    """Refuse numbers that no gear and no rig can have."""
     known = range_of(quantity)
     spread = known._replace(low=0.0, high=max(-known.low, known.high))
     ranges = {"log_sd": RANGES["log_sd"], "a": RANGES["beta"], "b": RANGES["beta"]}

@@ -94,14 +94,7 @@ def checked(
 
 
 def _words(error: dict, name: str, model: Any, place: list[str]) -> tuple[str, str]:
-    """Return problem and remedy of one of pydantic's errors.
-
-    Args:
-        error: as pydantic has it.
-        name: of the key.
-        model: that the data are validated by.
-        place: keys from the model's to this one.
-    """
+    """Return problem and remedy of one of pydantic's errors."""
     kind, example = error["type"], _EXAMPLES.get(name, f"{name} = … (a number)")
     if kind == _FAULT:
         return error["ctx"]["problem"], error["ctx"]["remedy"]

@@ -124,11 +124,7 @@ def screened_case(
 
 
 def _require_torsion(gear: Gear, name: str) -> None:
-    """Refuse a gear file that speaks of forces where torques were measured.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse a gear file that speaks of forces where torques were measured."""
     if gear.theory != SPRING:
         words = f"torques over angles are no readings of the theory {gear.theory}"
         remedy = "Leave the gear file out, or state the theory spring in it"

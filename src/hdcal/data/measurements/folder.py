@@ -33,12 +33,7 @@ _SIZES = ("wall_thickness", "radius", "length", "load_height")
 
 @dataclass(frozen=True)
 class _Part:
-    """What one file holds.
-
-    Attributes:
-        measured: what was read, its specimens named.
-        gear: as the file beside it says; None where each has none.
-    """
+    """What one file holds."""
 
     measured: Measurements
     gear: Gear | None

@@ -90,11 +90,6 @@ def _mounting(known: list, loose: list, cells: list[str]) -> list[str]:
     """Return the mounting of a gear that cells state; a new one is added to the known.
 
     An empty cell states none: of those that the others fit it is the latest.
-
-    Args:
-        known: mountings of the gear.
-        loose: those of them that began with an empty cell.
-        cells: unlike all before.
     """
     empty = NOT_STATED in cells
     # Without an empty cell on either side nothing fits.

@@ -103,13 +103,7 @@ def screened(
 def _without_scatter(
     measured: Measurements, run: np.ndarray, found: Screening
 ) -> Measurements:
-    """Return rows without the scatter of the deformation, of runs that show it.
-
-    Args:
-        measured: the rows that are kept.
-        run: index of the mounting as screened, shape (n,).
-        found: their screening.
-    """
+    """Return rows without the scatter of the deformation, of runs that show it."""
     x, force = measured["deformation"].copy(), measured["force"].copy()
     shaken = {o.run for o in found.observations if o.action == "smoothed"}
     for index in shaken:

@@ -55,7 +55,7 @@ class ReadTable:
 
     @property
     def rows(self) -> np.ndarray:
-        """Return the row of the source of each reading, shape (n,)."""
+        """Row of the source of each reading, shape (n,)."""
         return self.grid.rows
 
     def take(self, kept: np.ndarray) -> "ReadTable":
@@ -73,8 +73,8 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
 
     Args:
         grid: of a source.
-        findings: of the source; gets one for each line that is neither a reading nor
-            anything else.
+        findings: of the source; gets one for each kind of line that is neither a
+            reading nor anything else.
     """
     sample = _sample(grid)
     counted, empty = _kinds(sample)
@@ -83,47 +83,41 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
     first = sample.rows[int(np.argmax(known))] if known.any() else np.inf
     top, body = grid.take(grid.rows < first), grid.take(grid.rows >= first)
     clean = _are_readings(body, counted)
-    above, groups = _groups(
-        body.rows[clean], [*top.lines(), *body.take(~clean).lines(), *grid.loose]
-    )
-    heading = find_heading(above, grid.width)
-    _check_width(heading, grid.width, empty, findings)
+    lines = [*top.lines(), *body.take(~clean).lines(), *grid.loose]
+    # Lines that are no readings, by the number of readings above them.
+    groups: dict[int, list[SourceLine]] = {0: []}
+    for line in sorted(lines):
+        above = int(np.searchsorted(body.rows[clean], line.row))
+        groups.setdefault(above, []).append(line)
+    heading = find_heading(groups[0], grid.width)
+    cells = grid.width if heading is None else heading.cells
+    if heading is not None and not empty.issuperset(range(cells, grid.width)):
+        words = f"names {cells} columns, and the readings below have {grid.width}"
+        findings.refuse(words, "Name every column", heading.row)
     others = OtherLines(grid.width, counted, findings)
-    headings = others.sort_above(above, heading)
+    headings = [others.sort_above(groups.pop(0), heading)]
     total = int(clean.sum())
-    for readings, lines in groups.items():
+    for above, lines in groups.items():
         later = find_heading(lines, grid.width, heading) if heading else None
-        if later is None or readings == total:
-            others.sort(lines, below=readings == total)
+        if later is None or above == total:
+            others.sort(lines, below=above == total)
         else:
             headings.append(later)
-            others.sort([one for one in lines if one.row < later.row], titled=True)
-            others.sort([one for one in lines if one.row > later.last])
+            others.sort([line for line in lines if line.row < later.row], titled=True)
+            others.sort([line for line in lines if line.row > later.last])
     if others.spoilt and min(others.spoilt) < first:
         body, clean = grid, grid.rows >= first
         clean[clean] = _are_readings(grid.take(clean), counted)
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
     table = _joined(readings, headings, empty, others, findings)
-    table = replace(
-        table,
-        filled=len(readings.rows) + others.add_findings(),
-        skipped=_skipped(readings.rows, grid),
-    )
+    findings.add_rows(others.faults)
+    filled = len(readings.rows) + len(others.faults)
+    table = replace(table, filled=filled, skipped=_skipped(readings.rows, grid))
     return table, headings[0].titles
 
 
-def _check_width(
-    heading: Heading | None, width: int, empty: frozenset[int], findings: FileFindings
-) -> None:
-    """Refuse readings with more cells than their headers."""
-    unnamed = range(width if heading is None else heading.cells, width)
-    if heading is not None and not empty.issuperset(unnamed):
-        words = f"names {heading.cells} columns, and the readings below have {width}"
-        findings.refuse(words, "Name every column", heading.row)
-
-
 def _skipped(readings: np.ndarray, grid: Grid) -> int:
-    """Return how many lines between the first and the last reading are empty."""
+    """Return the number of empty lines between the first and the last reading."""
     if not len(readings):
         return 0
     first, last = readings[0], readings[-1]
@@ -144,13 +138,13 @@ def _sample(grid: Grid) -> Grid:
 def _kinds(sample: Grid) -> tuple[list[int], frozenset[int]]:
     """Return the columns that hold numbers in most rows, and those without a cell."""
     places, count = range(sample.width), len(sample.rows)
-    # What the source itself says to be numbers is not looked at.
+    # Columns that the source itself states to be numbers are not looked at.
     texts = [
         ["0"] * count if sample.is_numeric(place) else sample.texts(place)
         for place in places
     ]
     numbers = np.array([[*map(is_number, cells)] for cells in texts], bool)
-    filled = np.array([[bool(cell) for cell in cells] for cells in texts], bool)
+    filled = np.array([[*map(bool, cells)] for cells in texts], bool)
     rows = numbers.sum(axis=0) >= min(2, sample.width)
     if not rows.any():
         rows = numbers.any(axis=0)
@@ -164,18 +158,17 @@ def _are_readings(grid: Grid, counted: list[int]) -> np.ndarray:
     """Tell which rows have numbers in all counted columns, two at least, (n,)."""
     unsure = [place for place in counted if not grid.is_numeric(place)]
     numbers = np.full(len(grid.rows), len(counted))
-    fits = np.ones(len(grid.rows), bool)
+    fits = np.full(len(grid.rows), len(counted) > 0)
     for cells in grid.read(unsure).values():
-        if cells.dtype != object:
-            continue
-        each = cells.tolist()
-        held = np.array([not isinstance(c, str) or is_number(c) for c in each], bool)
-        numbers -= ~held
-        fits &= held | np.array([cell == "" for cell in each], bool)
+        if cells.dtype == object:
+            each = cells.tolist()
+            held = [not isinstance(c, str) or is_number(c) for c in each]
+            numbers -= ~np.array(held, bool)
+            fits &= np.array(held, bool) | np.array([c == "" for c in each], bool)
     fits &= numbers >= min(2, len(counted))
     if 0 not in counted and unsure:
         fits &= ~_summaries(grid.texts(0))
-    return fits & (len(counted) > 0)
+    return fits
 
 
 def _summaries(words: list[str]) -> np.ndarray:
@@ -189,22 +182,6 @@ def _summaries(words: list[str]) -> np.ndarray:
         neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
         found[place] = words[place] not in neighbours
     return found
-
-
-def _groups(
-    rows: np.ndarray, lines: list[SourceLine]
-) -> tuple[list[SourceLine], dict[int, list[SourceLine]]]:
-    """Return the lines above all readings, and others by the readings above them.
-
-    Args:
-        rows: of the readings, shape (n,).
-        lines: all others.
-    """
-    above, groups = [], {}
-    for line in sorted(lines):
-        readings = int(np.searchsorted(rows, line.row))
-        (groups.setdefault(readings, []) if readings else above).append(line)
-    return above, groups
 
 
 def _joined(
@@ -222,18 +199,14 @@ def _joined(
     words = "the columns are others than those of the first block"
     remedy = "Name them alike, or split the file"
     findings.add_rows((row, words, remedy) for row in foreign)
-    moved = {
-        place: order
-        for place, order in enumerate(orders)
-        if order and order != [*range(grid.width)]
-    }
+    usual = [*range(grid.width)]
+    moved = {i: order for i, order in enumerate(orders) if order and order != usual}
     left_out = [*others.left_out()]
     if moved:
         grid = _reordered(grid, block, moved)
         rows = row_list([headings[place].row for place in moved])
-        left_out.append(
-            f"the columns stand in another order below the headers of {rows}"
-        )
+        words = "the columns stand in another order below the headers of"
+        left_out.append(f"{words} {rows}")
     runs = np.unique(block, return_inverse=True)[1]
     return ReadTable(
         headers=main.names,
@@ -251,7 +224,7 @@ def _joined(
 
 
 def _order(heading: Heading, main: Heading) -> list[int] | None:
-    """Return where the first block's columns stand in another block, or None."""
+    """Return the places of the first block's columns in another block, or None."""
     if heading.names == main.names:
         return [*range(len(main.names))]
     alike = sorted(heading.names) == sorted(main.names)
@@ -261,20 +234,14 @@ def _order(heading: Heading, main: Heading) -> list[int] | None:
 
 
 def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> Grid:
-    """Return a grid with the columns of some blocks in other order.
-
-    Args:
-        grid: the readings of all blocks.
-        block: of each row, rising, shape (n,).
-        orders: where the columns stand in a block, by its number.
-    """
-    found = grid.read(range(grid.width))
+    """Return a grid with the columns of some blocks in the order of the first."""
+    columns = grid.read(range(grid.width))
     spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
 
     def load(place: int) -> np.ndarray:
-        column = found[place].astype(object)
+        column = columns[place].astype(object)
         for number, (begin, end) in spans.items():
-            column[begin:end] = found[orders[number][place]][begin:end]
+            column[begin:end] = columns[orders[number][place]][begin:end]
         return column
 
     return ArrayGrid(grid.rows, grid.width, [], load)

@@ -1,4 +1,4 @@
-"""Numbers in cells: their decimal mark, and what cells that hold none are."""
+"""Numbers in cells: their decimal mark, and what is wrong with cells that hold none."""
 
 import math
 import re
@@ -9,22 +9,21 @@ import numpy as np
 from hdcal.data.units import UNITS
 
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
-_UNITS = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
-_WITH_UNIT = re.compile(rf"(?P<number>[+-]?[\d.,eE+-]+)\s*(?P<unit>{_UNITS})")
 _POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-# Whole numbers, their thousands marked by points.
-_IN_THOUSANDS = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
-# The same by commas, at least once.
+_UNITS = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
+_WITH_UNIT = re.compile(rf"([+-]?[\d.,eE+-]+)\s*({_UNITS})")
+# Whole numbers whose thousands are marked by points; by commas, at least once.
+_POINTED = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
 _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
-# Label of what names none.
+# Label of a row whose source states none.
 NOT_STATED = "not stated"
-# Row in the array, problem and remedy.
+# Index, problem and remedy of a cell.
 Fault = tuple[int, str, str]
 
 
 class CellError(ValueError):
-    """A cell that is no number: the problem and the remedy, in words for the user."""
+    """A cell that is no number; its arguments are the problem and the remedy."""
 
 
 def is_number(cell: str) -> bool:
@@ -33,14 +32,13 @@ def is_number(cell: str) -> bool:
 
 
 def unit_in(cell: str) -> str:
-    """Return the unit behind the number in a cell, as in '12.5 N'; empty without."""
-    found = _WITH_UNIT.fullmatch(cell)
-    known = found is not None and NUMBER.fullmatch(found["number"])
-    return found["unit"] if found is not None and known else ""
+    """Return the unit behind the number in a cell, as in '12.5 N'; else ''."""
+    parts = _WITH_UNIT.fullmatch(cell)
+    return parts[2] if parts is not None and NUMBER.fullmatch(parts[1]) else ""
 
 
 def read_number(cell: str, comma: bool) -> float:
-    """Read one cell.
+    """Return the number in a cell.
 
     Args:
         cell: without blanks around it.
@@ -53,24 +51,22 @@ def read_number(cell: str, comma: bool) -> float:
         raise CellError("the cell is empty", "Fill it in or leave out the row")
     cell = cell.removesuffix(unit_in(cell)).rstrip()
     if _ENDLESS.fullmatch(cell):
-        words = f"'{cell}' is not a finite number"
-        raise CellError(words, "Leave out the row if nothing was read")
-    point = cell
-    if comma:
-        if "." in cell and "," not in cell and any(map(str.isdigit, cell)):
-            words = f"'{cell}' has a decimal point among decimal commas"
-            remedy = "Use one decimal sign in the whole file, and none for thousands"
-            raise CellError(words, remedy)
-        point = cell if "." in cell else cell.replace(",", ".")
+        remedy = "Leave out the row if nothing was read"
+        raise CellError(f"'{cell}' is not a finite number", remedy)
+    digits, point = any(map(str.isdigit, cell)), cell
+    if comma and "." not in cell:
+        point = cell.replace(",", ".")
+    elif comma and "," not in cell and digits:
+        remedy = "Use one decimal sign in the whole file, and none for thousands"
+        raise CellError(f"'{cell}' has a decimal point among decimal commas", remedy)
     if not _POINT.fullmatch(point):
         remedy = "Write the reading, or leave out the row if there is none"
-        if any(map(str.isdigit, cell)):
+        if digits:
             remedy = "Write a plain number with a point, and no sign for thousands"
         raise CellError(f"'{cell}' is not a number", remedy)
     number = float(point)
     if math.isinf(number):
-        words = f"'{cell}' is too large for a finite number"
-        raise CellError(words, "Check the cell")
+        raise CellError(f"'{cell}' is too large for a finite number", "Check the cell")
     return number
 
 
@@ -101,19 +97,21 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
         comma: whether texts have decimal commas.
 
     Returns:
-        Floats, NaN where a cell is wrong, shape (n,); and what is wrong.
+        Floats, NaN where a cell is wrong, shape (n,); and the faults.
     """
-    numbers, wrong = np.full(len(cells), np.nan), []
+    numbers, faults = np.full(len(cells), np.nan), []
     for index, cell in enumerate(cells.tolist()):
-        stored = not isinstance(cell, str)
-        if stored and not isinstance(cell, bool) and math.isfinite(cell):
-            numbers[index] = cell
-            continue
         try:
-            numbers[index] = read_number(str(cell), comma)
+            numbers[index] = (
+                cell
+                if isinstance(cell, float | int)
+                and not isinstance(cell, bool)
+                and math.isfinite(cell)
+                else read_number(str(cell), comma)
+            )
         except CellError as error:
-            wrong.append((index, *error.args))
-    return numbers, wrong
+            faults.append((index, *error.args))
+    return numbers, faults
 
 
 def may_hold_thousands(numbers: np.ndarray) -> bool:
@@ -124,22 +122,18 @@ def may_hold_thousands(numbers: np.ndarray) -> bool:
 
 
 def thousands(cells: list[str]) -> list[Fault]:
-    """Return which cells may be thousands that are marked by a point.
+    """Return the cells that may be thousands marked by a point.
 
     Beside 567 a 1.234, or a 1.000, is more likely a thousand than a one, where all
     others are whole.
     """
-    if not all(_IN_THOUSANDS.fullmatch(cell) for cell in cells):
-        return []
     pointed = [index for index, cell in enumerate(cells) if "." in cell]
-    if len(pointed) == len(cells):
+    if len(pointed) == len(cells) or not all(map(_POINTED.fullmatch, cells)):
         return []
     words = "may be a thousand, as no other number here has decimals"
-    return [
-        (
-            index,
-            f"'{cells[index]}' {words}",
-            f"Write {cells[index].replace('.', '')} if it is one, else {cells[index]}0",
-        )
-        for index in pointed
-    ]
+    faults = []
+    for index in pointed:
+        cell = cells[index]
+        remedy = f"Write {cell.replace('.', '')} if it is one, else {cell}0"
+        faults.append((index, f"'{cell}' {words}", remedy))
+    return faults

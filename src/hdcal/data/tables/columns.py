@@ -110,12 +110,7 @@ def _check_names(
 
 
 class _Chooser:
-    """Choice by headers.
-
-    Args:
-        table: whose headers are read.
-        findings: of the file.
-    """
+    """Choice by headers."""
 
     def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings
@@ -256,11 +251,6 @@ def _label_columns(
 
     Of columns that tell the same rows apart the first one, and of those that tell none
     apart one only where no other does. More than one: headers do not say which.
-
-    Args:
-        table: the readings.
-        headers: what its headers mean.
-        quantity: one of the labels.
     """
     found = [i for i, header in enumerate(headers) if header.quantity == quantity]
     exact = [i for i in found if headers[i].exact]

@@ -1,12 +1,13 @@
-"""Grids of cells: what every source becomes before anything is looked for in it."""
+"""Grids of cells: every source becomes one before its readings are searched."""
 
 import csv
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,7 @@ T = TypeVar("T")
 
 
 class SourceLine(NamedTuple):
-    """A row of a source that is no reading, or none yet.
+    """A row of a source that is no reading, or not yet known to be one.
 
     Attributes:
         row: of the source, 1 = first.
@@ -31,20 +32,21 @@ class SourceLine(NamedTuple):
 
     @property
     def first(self) -> str:
-        """Return the first cell that is not empty."""
+        """First cell that is not empty."""
         return next(filter(None, self.cells), "")
 
     @property
     def numbers(self) -> int:
-        """Return how many cells are numbers."""
+        """Number of cells that are numbers."""
         return sum(map(is_number, self.cells))
 
     @property
     def counts(self) -> bool:
-        """Tell whether it begins as a number or a time does."""
+        """Whether it begins as a number or a time does."""
         return self.first.lstrip("+-.,")[:1].isdigit()
 
 
+@dataclass(frozen=True)
 class Grid(ABC):
     """Rows of cells.
 
@@ -67,19 +69,20 @@ class Grid(ABC):
         """
 
     @abstractmethod
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
-
     def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
         """Return the index of each cell, shape (n,), and the texts in a column."""
-        return factorize(self.texts(column))
 
     @abstractmethod
-    def take(self, chosen: np.ndarray) -> "Grid":
+    def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
 
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
+        index, texts = self.labels(column)
+        return np.array(texts, object)[index].tolist()
+
     def is_numeric(self, column: int) -> bool:
-        """Tell whether the source itself says that a column holds numbers only."""
+        """Tell whether the source itself states that a column holds only numbers."""
         return False
 
     def has_commas(self) -> bool:
@@ -90,7 +93,7 @@ class Grid(ABC):
         """Return the rows."""
         if not len(self.rows):
             return []
-        cells = zip(*(self.texts(column) for column in range(self.width)), strict=True)
+        cells = zip(*map(self.texts, range(self.width)), strict=True)
         rows = zip(self.rows.tolist(), cells, strict=True)
         return [SourceLine(row, [*texts], fits=True) for row, texts in rows]
 
@@ -100,49 +103,51 @@ class TextGrid(Grid):
     """Lines of a text with as many cells each.
 
     Attributes:
-        rows: as in `Grid`.
-        width: likewise.
-        loose: likewise.
         separator: of the cells.
         text: the lines.
         quoted: some cells stand in quotation marks.
     """
 
-    rows: np.ndarray
-    width: int
-    loose: list[SourceLine]
     separator: str
     text: list[str]
     quoted: bool
 
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
-        """As in `Grid`."""
+        """Return columns by position, shape (n,) each; see `Grid`."""
         wanted = [*columns]
         missing = [place for place in wanted if place not in self._read]
         floats = self._floats(missing)
         for place in missing:
-            found = self._floats([place]) if floats is None else floats
-            if found is None:
-                found = {place: np.array(self.texts(place), object)}
-            self._read[place] = found[place]
+            column = self._floats([place]) if floats is None else floats
+            if column is None:
+                column = {place: np.array(self.texts(place), object)}
+            self._read[place] = column[place]
         return {place: self._read[place] for place in wanted}
 
     def texts(self, column: int) -> list[str]:
-        """As in `Grid`."""
+        """Return the cells of a column as texts without blanks around them."""
         mark = self.separator
         if self.quoted:
             return [split_line(line, mark)[column] for line in self.text]
         return [line.split(mark, column + 1)[column].strip() for line in self.text]
 
-    def take(self, chosen: np.ndarray) -> "TextGrid":
-        """As in `Grid`."""
+    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+        """Return the index of each cell, shape (n,), and the texts in a column."""
+        return factorize(self.texts(column))
+
+    def take(self, chosen: np.ndarray) -> Self:
+        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
         if chosen.all() and not self.loose:
             return self
         lines = [*compress(self.text, chosen.tolist())]
         return replace(self, rows=self.rows[chosen], text=lines, loose=[])
 
+    def has_commas(self) -> bool:
+        """Tell whether texts may have decimal commas that `read` takes for such."""
+        return self.separator != "," and any("," in line for line in self.text)
+
     def _floats(self, columns: list[int]) -> dict[int, np.ndarray] | None:
-        """Return columns where all of them are finite numbers."""
+        """Return columns if all of their cells are finite numbers."""
         if not self.text or not columns:
             return {place: np.array([], object) for place in columns}
         lines = self.text
@@ -151,7 +156,7 @@ class TextGrid(Grid):
             text = "\n".join(lines).replace(".", "?").replace(",", ".")
             lines = text.split("\n")
         try:
-            found = np.loadtxt(
+            table = np.loadtxt(
                 lines,
                 delimiter=self.separator,
                 usecols=columns,
@@ -161,17 +166,13 @@ class TextGrid(Grid):
             )
         except ValueError:
             return None
-        finite = len(found) == len(lines) and np.isfinite(found).all()
-        return dict(zip(columns, found.T.copy(), strict=True)) if finite else None
+        finite = len(table) == len(lines) and np.isfinite(table).all()
+        return dict(zip(columns, table.T.copy(), strict=True)) if finite else None
 
     @cached_property
     def _read(self) -> dict[int, np.ndarray]:
         """Columns that were read already."""
         return {}
-
-    def has_commas(self) -> bool:
-        """As in `Grid`."""
-        return self.separator != "," and any("," in line for line in self.text)
 
 
 @dataclass(frozen=True)
@@ -179,60 +180,47 @@ class ArrayGrid(Grid):
     """Columns of arrays, each loaded when it is needed.
 
     Attributes:
-        rows: as in `Grid`.
-        width: likewise.
-        loose: likewise.
         load: returns a column, numbers or objects.
         numeric: positions of the columns that are stored as numbers.
-        index: which of the loaded rows these are, shape (n,).
+        index: which of the loaded rows these are, shape (n,); None of all.
     """
 
-    rows: np.ndarray
-    width: int
-    loose: list[SourceLine]
     load: Callable[[int], np.ndarray]
     numeric: frozenset[int] = frozenset()
     index: np.ndarray | None = None
 
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
-        """As in `Grid`."""
+        """Return columns by position, shape (n,) each; see `Grid`."""
         return {place: self._column(place) for place in columns}
 
-    def texts(self, column: int) -> list[str]:
-        """As in `Grid`."""
-        index, texts = self.labels(column)
-        return np.array(texts, object)[index].tolist()
-
     def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """As in `Grid`."""
+        """Return the index of each cell, shape (n,), and the texts in a column."""
         index, cells = factorize(self._column(column).tolist())
-        return index, [stored_text(cell) for cell in cells]
+        return index, [*map(stored_text, cells)]
 
-    def take(self, chosen: np.ndarray) -> "ArrayGrid":
-        """As in `Grid`."""
+    def take(self, chosen: np.ndarray) -> Self:
+        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
         index = np.flatnonzero(chosen)
         index = index if self.index is None else self.index[index]
         return replace(self, rows=self.rows[chosen], index=index, loose=[])
 
     def is_numeric(self, column: int) -> bool:
-        """As in `Grid`."""
+        """Tell whether the source itself states that a column holds only numbers."""
         return column in self.numeric
 
     def _column(self, place: int) -> np.ndarray:
-        found = self.load(place)
-        found = found if self.index is None else found[self.index]
-        if found.dtype != object:
-            floats = found.astype(float)
-            known = np.isfinite(floats)
-            if known.all():
-                return floats
-            found = floats.astype(object)
-            found[np.isnan(floats)] = ""
-            return found
-        if all(isinstance(cell, float | int) for cell in found.tolist()):
-            floats = found.astype(float)
-            return floats if np.isfinite(floats).all() else found
-        return found
+        cells = self.load(place)
+        cells = cells if self.index is None else cells[self.index]
+        stored = cells.dtype != object
+        if not stored and not all(isinstance(c, float | int) for c in cells.tolist()):
+            return cells
+        floats = cells.astype(float)
+        if np.isfinite(floats).all():
+            return floats
+        if stored:
+            cells = floats.astype(object)
+            cells[np.isnan(floats)] = ""
+        return cells
 
 
 def factorize(labels: Sequence[T]) -> tuple[np.ndarray, list[T]]:
@@ -242,7 +230,7 @@ def factorize(labels: Sequence[T]) -> tuple[np.ndarray, list[T]]:
 
 
 def stored_text(cell: Any) -> str:
-    """Return a cell as text: a number in full, nothing that would end a line."""
+    """Return a cell as text: a number in full, on one line."""
     if cell is None or cell != cell:
         return ""
     if isinstance(cell, float):
@@ -252,10 +240,8 @@ def stored_text(cell: Any) -> str:
 
 def split_line(line: str, separator: str) -> list[str]:
     """Return the cells of a line without blanks around them."""
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)]
-    try:
-        cells = next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:  # a cell longer than the csv module will hold
-        cells = line.split(separator)
+    cells = line.split(separator)
+    if '"' in line:
+        with suppress(csv.Error):  # a cell longer than the csv module will hold
+            cells = next(csv.reader([line], delimiter=separator), [])
     return [cell.strip() for cell in cells]

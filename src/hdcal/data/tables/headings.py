@@ -6,18 +6,14 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from hdcal.data.tables.grid import SourceLine
-from hdcal.data.tables.headers import (
-    DIMENSIONS,
-    LABELS,
-    is_unit_text,
-    parse_header,
-)
+from hdcal.data.tables.headers import DIMENSIONS, LABELS, is_unit_text, parse_header
 from hdcal.data.units import find_unit
 
 # Lines above the readings among which the names stand.
 _NEAR = 20
 # Words before a row of units, and names of columns of them.
-UNIT_LABELS = "unit units einheit einheiten unité 単位 单位 y_unit_label"
+UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "unité", "単位", "单位"}
+UNIT_LABELS |= {"y_unit_label"}
 _MARK = re.compile(r"\A\s*[#%*/]+\s*")
 
 
@@ -60,7 +56,8 @@ def find_heading(
     """
     near = lines[-_NEAR:]
     units = next((one for one in reversed(lines) if _is_unit_line(one, near)), None)
-    texts = _units_of(units, width)
+    cells = _padded(units.cells if units is not None else [], width)
+    texts = [cell.strip("()[] ") if is_unit_text(cell) else "" for cell in cells]
     named = [(_quantities(one, texts), one.row, one) for one in near if one != units]
     named = [one for one in named if _may_name(one[2], one[0], width)]
     if not named and units is not None and units in near:
@@ -79,14 +76,14 @@ def find_heading(
         return None
     above = [line.cells for line in lines if line.row == best.row - 1]
     return Heading(
-        tuple(map(_with_unit, bare, texts)),
-        bare,
-        tuple(_padded(above[0] if above else [], width)),
-        best.row,
-        last,
-        None if units is None else units.row,
-        len(best.cells),
-        _conflicts(bare, texts),
+        names=tuple(map(_with_unit, bare, texts)),
+        bare=bare,
+        titles=tuple(_padded(above[0] if above else [], width)),
+        row=best.row,
+        last=last,
+        unit_row=None if units is None else units.row,
+        cells=len(best.cells),
+        conflicts=_conflicts(bare, texts),
     )
 
 
@@ -100,9 +97,9 @@ def _may_name(line: SourceLine, quantities: int, width: int) -> bool:
 
 def _quantities(line: SourceLine, units: list[str]) -> int:
     """Return how many cells of a line name a quantity of a spring, or a run."""
-    pairs = zip(line.cells, [*units, *[""] * len(line.cells)], strict=False)
-    found = [parse_header(_with_unit(_MARK.sub("", n), unit)) for n, unit in pairs]
-    return sum(h.quantity in (*DIMENSIONS, *LABELS[:2]) for h in found)
+    pairs = zip(line.cells, _padded(units, len(line.cells)), strict=True)
+    headers = [parse_header(_with_unit(_MARK.sub("", n), unit)) for n, unit in pairs]
+    return sum(h.quantity in (*DIMENSIONS, *LABELS[:2]) for h in headers)
 
 
 def _is_unit_line(line: SourceLine, near: list[SourceLine]) -> bool:
@@ -110,16 +107,10 @@ def _is_unit_line(line: SourceLine, near: list[SourceLine]) -> bool:
     filled = [cell for cell in line.cells if cell]
     if not filled or line.numbers:
         return False
-    if filled[0].strip(" :").casefold() in UNIT_LABELS.split():
+    if filled[0].strip(" :").casefold() in UNIT_LABELS:
         return any(map(is_unit_text, filled[1:]))
-    units = [cell for cell in filled if is_unit_text(cell)]
-    return line in near and any(map(find_unit, filled)) and 2 * len(units) > len(filled)
-
-
-def _units_of(line: SourceLine | None, width: int) -> list[str]:
-    """Return the units of a line, without its label, shape (c,)."""
-    cells = _padded(line.cells if line is not None else [], width)
-    return [cell.strip("()[] ") if is_unit_text(cell) else "" for cell in cells]
+    units = sum(map(is_unit_text, filled))
+    return line in near and any(map(find_unit, filled)) and 2 * units > len(filled)
 
 
 def _bare_names(line: SourceLine, lines: list[SourceLine], width: int) -> list[str]:
@@ -141,13 +132,13 @@ def _with_unit(name: str, unit: str) -> str:
 
 def _conflicts(names: Sequence[str], units: Sequence[str]) -> dict[int, str]:
     """Return the units of the row of units that differ from headers, by position."""
-    found = {}
+    conflicts = {}
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         header, other = parse_header(name), find_unit(unit)
         named = header.unit if header.quantity else None
         if named is not None and unit and other != named:
-            found[place] = unit
-    return found
+            conflicts[place] = unit
+    return conflicts
 
 
 def _padded(cells: list[str], width: int) -> list[str]:

@@ -35,7 +35,7 @@ def with_unit_columns(table: ReadTable, findings: FileFindings) -> ReadTable:
     headers, notes = [*table.headers], [*table.notes]
     for place in range(1, len(headers)):
         label = headers[place].strip().casefold()
-        if label not in UNIT_LABELS.split():
+        if label not in UNIT_LABELS:
             continue
         units = [*dict.fromkeys(filter(None, table.grid.texts(place)))]
         name = headers[place - 1]

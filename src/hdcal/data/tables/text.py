@@ -25,6 +25,16 @@ _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _HTML = re.compile(
     r"\s*<(!doctype html|html|table|head|body|\?xml[^>]*>\s*<html)", re.I
 )
+# Lines at the top, and spread over the rest, by which the separator is judged.
+_SAMPLE = 300
+# Cells by which a line of headers may be longer than the readings below it: remarks.
+_MOST_REMARKS = 2
+# Lines of numbers between blanks that make a table.
+_FEWEST = 5
+# Characters of an empty line.
+_BLANKS = ' \t;,|"'
+_MARK = re.compile(r"\s*[#%*/]+\s*")
+_GAP = re.compile(r"\s{2,}")
 
 
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
@@ -36,13 +46,12 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
         wide: the text may hold zeros.
 
     Raises:
-        InputError: the file is binary, too large, or has a line over 1 MiB.
+        InputError: the file is binary, or has a line over 1 MiB.
     """
-    kept, line, row, size = [], 0, 1, 0
+    kept, line, row = [], 0, 1
     with open(path, "rb") as stream:
         while chunk := stream.read(_CHUNK):
-            if not kept:
-                wide = wide or chunk.startswith(_WIDE_MARKS)
+            wide = wide or (not kept and chunk.startswith(_WIDE_MARKS))
             if not wide and b"\0" in chunk:
                 findings.refuse("is a binary file", "Save it as UTF-8 text")
             last = max(chunk.rfind(b"\n"), chunk.rfind(b"\r"))
@@ -51,10 +60,6 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
                 row += sum(part.count(b"\n") for part in kept)
                 words = "has a line of more than 1 MiB, so it is no table of readings"
                 findings.refuse(words, "Write one row of readings per line", row)
-            size += len(chunk)
-            if size > LARGEST_FILE:
-                remedy = "Split or thin out the readings"
-                findings.refuse("is larger than 4 GiB", remedy)
             kept.append(chunk)
     return b"".join(kept)
 
@@ -62,12 +67,12 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
 def decode(
     raw: bytes, findings: FileFindings, encoding: str | None
 ) -> tuple[str, list[str]]:
-    """Return a text with plain newlines, and what was assumed of its encoding.
+    """Return a text with plain newlines, and notes on its encoding.
 
     Args:
         raw: the bytes.
         findings: of the file.
-        encoding: by default UTF-8, UTF-16 with its mark, or what the bytes look like.
+        encoding: by default UTF-8, UTF-16 with its mark, or the likeliest.
 
     Raises:
         InputError: they are no text in it, or a web page.
@@ -103,36 +108,24 @@ def _likely(raw: bytes) -> str:
         return "utf-8"
     except UnicodeDecodeError:
         pass
-    # Degrees and micrometres alone look like Chinese to whoever counts letters.
+    # Degrees and micrometres alone look like Chinese by the count of letters.
     signs = raw.decode("cp1252", errors="replace")
     if {sign for sign in signs if not sign.isascii()} <= _WESTERN:
         return "cp1252"
     import charset_normalizer
 
     lines = [line for line in raw.splitlines() if not line.isascii()]
-    found = charset_normalizer.from_bytes(
+    best = charset_normalizer.from_bytes(
         b"\n".join(lines[:_JUDGED]), cp_isolation=list(_ENCODINGS)
     ).best()
-    return found.encoding if found is not None else _ENCODINGS[0]
-
-
-# Lines at the top, and spread over the rest, by which the separator is judged.
-_SAMPLE = 300
-# Cells by which a line of headers may be longer than the readings below it: remarks.
-_MOST_REMARKS = 2
-# Lines of numbers between blanks that make a table.
-_FEWEST = 5
-# What an empty line may hold.
-_BLANKS = ' \t;,|"'
-_MARK = re.compile(r"\s*[#%*/]+\s*")
-_GAP = re.compile(r"\s{2,}")
+    return best.encoding if best is not None else _ENCODINGS[0]
 
 
 def text_grid(text: str) -> tuple[TextGrid, list[str]]:
-    """Return the grid of a text, and what was assumed of it.
+    """Return the grid of a text, and notes on what was assumed.
 
-    Its cells are separated as most lines of numbers are; without such lines as the
-    first line is.
+    The separator is that of most lines of numbers; without such lines, that of the
+    first line.
 
     Args:
         text: with plain newlines.
@@ -143,37 +136,35 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
         notes.append("the columns are separated by blanks")
         lines, separator = [_tabbed(line, width) for line in lines], "\t"
     if not separator:
-        separator, width = _first_line(lines)
+        first = next((line for line in lines if line.strip()), "")
+        # A semicolon or a tab is never part of a number; a comma may be one.
+        separator = max(";\t", key=first.count)
+        separator = separator if separator in first else ","
+        width = len(split_line(first, separator))
     counts = np.fromiter((line.count(separator) for line in lines), int, len(lines)) + 1
     quoted = '"' in text
     for index in (i for i, line in enumerate(lines) if quoted and '"' in line):
-        counts[index] = _quoted_cells(lines[index], separator)
+        # No line with an open quotation mark is one of readings.
+        is_open = lines[index].count('"') % 2
+        counts[index] = 0 if is_open else len(split_line(lines[index], separator))
     widest = _heading_width(lines, separator, counts, width)
     fits = (counts >= width) & (counts <= widest)
     for index in np.flatnonzero(fits & (counts < widest)):
         lines[index] += separator * int(widest - counts[index])
     # Most lines begin with a digit or a letter.
-    empty = np.fromiter(
-        (line[:1] in _BLANKS and not line.strip(_BLANKS) for line in lines),
-        bool,
-        len(lines),
-    )
+    blank = (line[:1] in _BLANKS and not line.strip(_BLANKS) for line in lines)
+    empty = np.fromiter(blank, bool, len(lines))
     loose = [
-        SourceLine(index + 1, cells_of(lines[index], separator), fits=False)
+        SourceLine(index + 1, _cells_of(lines[index], separator), fits=False)
         for index in np.flatnonzero(~fits & ~empty).tolist()
     ]
     kept = fits & ~empty
-    return TextGrid(
-        rows=np.flatnonzero(kept) + 1,
-        width=widest,
-        loose=loose,
-        separator=separator,
-        text=[*compress(lines, kept.tolist())],
-        quoted=quoted,
-    ), notes
+    text_lines = [*compress(lines, kept.tolist())]
+    rows = np.flatnonzero(kept) + 1
+    return TextGrid(rows, widest, loose, separator, text_lines, quoted), notes
 
 
-def cells_of(line: str, separator: str) -> list[str]:
+def _cells_of(line: str, separator: str) -> list[str]:
     """Return the cells of a line, or the line where a quotation mark stays open."""
     return [line] if line.count('"') % 2 else split_line(line, separator)
 
@@ -185,23 +176,25 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
     tab or a semicolon is never part of a number; a comma may be one.
     """
     step = max(1, len(lines) // _SAMPLE)
-    sample = [
-        line for line in (*lines[:_SAMPLE], *lines[_SAMPLE::step]) if line.strip()
-    ]
+    sample = (*lines[:_SAMPLE], *lines[_SAMPLE::step])
+    sample = [line for line in sample if line.strip()]
     tabs = any("\t" in line.strip() for line in sample)
-    most, found = 0, ("", 0)
+    most, best = 0, ("", 0)
     for separator in SEPARATORS if tabs else SEPARATORS + " ":
         shares = [*filter(None, (_numbers(line, separator) for line in sample))]
         if not shares or (separator == " " and len(shares) < _FEWEST):
             continue
         width, count = Counter(cells for cells, _ in shares).most_common(1)[0]
         if count > most:
-            most, found = count, (separator, width)
-    return found
+            most, best = count, (separator, width)
+    return best
 
 
 def _numbers(line: str, separator: str) -> tuple[int, float] | None:
-    """Return how many cells a line has, and the share of numbers among filled ones."""
+    """Return the number of cells of a line, and the share of numbers among filled ones.
+
+    None of a line with fewer than two numbers.
+    """
     if separator == " ":
         cells = line.split()
         # A comma at the end of a number separates it from the next.
@@ -213,32 +206,18 @@ def _numbers(line: str, separator: str) -> tuple[int, float] | None:
     return (len(cells), numbers / sum(map(bool, cells))) if numbers >= 2 else None
 
 
-def _first_line(lines: list[str]) -> tuple[str, int]:
-    """Return the separator and the cells of the first line that is not empty."""
-    first = next((line for line in lines if line.strip()), "")
-    # A semicolon or a tab is never part of a number; a comma may be one.
-    separator = max(";\t", key=first.count)
-    separator = separator if separator in first else ","
-    return separator, len(split_line(first, separator))
-
-
 def _heading_width(
     lines: list[str], separator: str, counts: np.ndarray, width: int
 ) -> int:
     """Return the cells of a line of headers, some of which may name remarks."""
     likely = np.flatnonzero(counts == width).tolist()
-    found = ((i, _numbers(lines[i], separator)) for i in likely)
+    shares = ((i, _numbers(lines[i], separator)) for i in likely)
     # Names of gauges may be numbers too, but not most of them.
-    first = next((i for i, one in found if one is not None and one[1] > 0.5), 0)
+    first = next((i for i, one in shares if one is not None and one[1] > 0.5), 0)
     begins = ((i, split_line(lines[i], separator)[0]) for i in range(first))
     above = [i for i, cell in begins if lines[i].strip() and not is_number(cell)]
     header = int(counts[above[-1]]) if above else width
     return header if width < header <= width + _MOST_REMARKS else width
-
-
-def _quoted_cells(line: str, separator: str) -> int:
-    """Return the number of cells; 0 of a line with an open quotation mark."""
-    return 0 if line.count('"') % 2 else len(split_line(line, separator))
 
 
 def _tabbed(line: str, width: int) -> str:
