@@ -31,7 +31,7 @@ from hdcal.screening.result import Screening
 
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 _CORRELATION = "noise_correlation"
-# What a gear file says of the rig that presses, and not of one that twists.
+# Facts of a rig that presses, and not of one that twists.
 _OF_FORCE = ("deformation", "force_calibration", "deformation_calibration")
 
 
@@ -46,9 +46,9 @@ def case_of(
     """Return what was measured on a gear, or several of its kind, as a case.
 
     Args:
-        measured: in which nothing is wrong.
+        measured: without faults.
         gear: as its file has it.
-        notes: on how that was found.
+        notes: on how that was read.
         name: of the case.
         range: working range; by default that of the gear file.
         skip_bad: as in `read_case`.
@@ -78,7 +78,7 @@ def screened_case(
         measured: without the rows that were cut.
         screening: of all rows; None of those of several parts.
         gear: as its file has it.
-        notes: on how that was found.
+        notes: on how that was read.
         name: of the case.
     """
     if measured.units == TORQUE:
@@ -86,25 +86,18 @@ def screened_case(
     (specimen, gears), (run, runs) = measured.gears, measured.runs
     motion = _motion(measured, run, screening)
     further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
-    of_record = [*resets_note(motion, measured.rows, measured.units)]
     mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
-    of_record += mountings_note(measured.stated, mounted, len(gears))
-    of_record += rigs_note(measured.get("rig", ()), len(gears))
-    of_record += [] if screening is None else screening_notes(screening, measured.units)
-    x, force = measured["deformation"], measured["force"]
-    shipped = rig_priors()[_CORRELATION].source
-    if gear.scale_priors[_CORRELATION].source == shipped:
-        cutoff = gear.source.get("rig", {}).get("filter_Hz")
-        prior = correlation_prior(cutoff, x, run, measured.get("time"))
-        gear = replace(gear, scale_priors=gear.scale_priors | {_CORRELATION: prior})
-    scale = scale_of(force, x, gear.reading)
-    gear = at_full_scale(gear, scale)
-    if measured.units == TORQUE:
-        # The shipped prior is that of a contact, in mm.
-        zero = {"deformation_offset": scale.own(gear.priors["deformation_offset"])}
-        gear = replace(gear, priors=gear.priors | zero)
-    cut = screening is not None and len(gears) == 1
-    every = [*measured.notes, *notes, *of_record, *of_labels]
+    every = [
+        *measured.notes,
+        *notes,
+        *resets_note(motion, measured.rows, measured.units),
+        *mountings_note(measured.stated, mounted, len(gears)),
+        *rigs_note(measured.get("rig", ()), len(gears)),
+        *([] if screening is None else screening_notes(screening, measured.units)),
+        *of_labels,
+    ]
+    gear = _at_own_scale(gear, measured, run)
+    cut = screening if len(gears) == 1 else None
     return Case(
         name=name,
         gear=gear,
@@ -115,16 +108,31 @@ def screened_case(
         notes=tuple(sorted(every, key=lambda note: not note.startswith(ASSUMED))),
         columns=measured.named,
         left_out=measured.left_out,
-        excluded=screening.excluded if cut and screening is not None else (),
-        excluded_sense=screening.excluded_sense if cut and screening is not None else 0,
+        excluded=() if cut is None else cut.excluded,
+        excluded_sense=0 if cut is None else cut.excluded_sense,
         screening=screening,
         units=measured.units,
         **further,
     )
 
 
+def _at_own_scale(gear: Gear, measured: Measurements, run: np.ndarray) -> Gear:
+    """Return a gear whose shipped priors are those of its rig and its readings."""
+    x, priors, scales = measured["deformation"], gear.priors, gear.scale_priors
+    if scales[_CORRELATION].source == rig_priors()[_CORRELATION].source:
+        cutoff = gear.source.get("rig", {}).get("filter_Hz")
+        prior = correlation_prior(cutoff, x, run, measured.get("time"))
+        scales = scales | {_CORRELATION: prior}
+    scale = scale_of(measured["force"], x, gear.reading)
+    if measured.units == TORQUE:
+        # The shipped prior is that of a contact, in mm.
+        zero = scale.own(priors["deformation_offset"])
+        priors = priors | {"deformation_offset": zero}
+    return at_full_scale(replace(gear, priors=priors, scale_priors=scales), scale)
+
+
 def _require_torsion(gear: Gear, name: str) -> None:
-    """Refuse a gear file that speaks of forces where torques were measured."""
+    """Refuse a gear file on forces where torques were measured."""
     if gear.theory != SPRING:
         words = f"torques over angles are no readings of the theory {gear.theory}"
         remedy = "Leave the gear file out, or state the theory spring in it"
@@ -156,6 +164,13 @@ def _records(
     run: np.ndarray,
     specimen: np.ndarray,
 ) -> Records:
+    known = {"temperature", "time", "angle", "force_sd"} & {*measured.frame}
+    if "force_sd" in known and not measured["force_sd"].any():
+        known.remove("force_sd")  # a column of zeros says that nothing is known
+    for name, index in (("run", run), ("specimen", specimen)):
+        many = int(index.max(initial=0)) + 1
+        known |= {name} if many > 1 else set()
+        known |= {f"{name}s"} if many >= MANY else set()
     zeros = np.zeros(len(run))
     # NumPy arrays: JAX takes them when it computes, and reading starts no device
     return Records(
@@ -170,19 +185,5 @@ def _records(
         specimen=specimen,
         force=measured["force"],
         force_sd=measured.get("force_sd", zeros),
-        known=motion.features | _known(measured, run, specimen),
+        known=motion.features | known,
     )
-
-
-def _known(
-    measured: Measurements, run: np.ndarray, specimen: np.ndarray
-) -> frozenset[str]:
-    """Return what is known of the rows, as `Records` has it."""
-    known = {"temperature", "time", "angle", "force_sd"} & {*measured.frame}
-    if "force_sd" in known and not measured["force_sd"].any():
-        known.remove("force_sd")  # a column of zeros says that nothing is known
-    for name, index in (("run", run), ("specimen", specimen)):
-        many = int(index.max(initial=0)) + 1
-        known |= {name} if many > 1 else set()
-        known |= {f"{name}s"} if many >= MANY else set()
-    return frozenset(known)

@@ -1,6 +1,6 @@
 """Checks of readings, whatever the rig."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -8,9 +8,11 @@ import pandas as pd
 from hdcal.data.case import Gear
 from hdcal.data.findings import FileFindings
 from hdcal.data.plausible import RANGES
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import DIMENSIONS
 from hdcal.data.tables.named_columns import Column
 
+FEWEST_ROWS = 5
 # Kelvin become degrees Celsius with an error of rounding.
 _ROUNDED = 1e-9
 
@@ -18,21 +20,13 @@ _ROUNDED = 1e-9
 def check_whole(
     frame: pd.DataFrame,
     used: Mapping[str, Column],
-    filled: int,
-    fewest: int,
+    table: ReadTable,
     findings: FileFindings,
+    fewest: int = FEWEST_ROWS,
 ) -> None:
-    """Find what is wrong with a source as a whole.
-
-    Args:
-        frame: its readings.
-        used: columns by quantity.
-        filled: rows with any cell in them.
-        fewest: rows that are needed.
-        findings: of the source.
-    """
-    if filled < fewest:
-        words = f"holds {filled} rows of readings"
+    """Find too few rows in a source, and a deformation that is constant."""
+    if table.filled < fewest:
+        words = f"holds {table.filled} rows of readings"
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
         column = used["deformation"]
@@ -49,13 +43,7 @@ def is_constant(deformation: np.ndarray) -> bool:
 def check_rows(
     frame: pd.DataFrame, used: Mapping[str, Column], findings: FileFindings
 ) -> None:
-    """Find numbers that no rig reads.
-
-    Args:
-        frame: of the readings.
-        used: columns by quantity.
-        findings: of the source.
-    """
+    """Find numbers that no rig reads."""
     for quantity in filter(frame.columns.__contains__, DIMENSIONS):
         column, values = used[quantity], frame[quantity].to_numpy()
         known = RANGES[column.quantity]
@@ -66,17 +54,12 @@ def check_rows(
         findings.add_rows(((row, *words) for row in rows), column.header)
 
 
-def too_far(
-    frame: pd.DataFrame, gear: Gear, findings: FileFindings
-) -> Iterator[tuple[int, str, str]]:
-    """Yield the farthest row of each specimen that no gear of this radius reaches.
+def check_reach(
+    frame: pd.DataFrame, column: Column, gear: Gear, findings: FileFindings
+) -> None:
+    """Find the farthest row of each specimen that no gear of this radius reaches.
 
-    Rows of which something else is wrong do not count.
-
-    Args:
-        frame: of the readings.
-        gear: whose radius it is.
-        findings: of the source.
+    Rows with another fault do not count.
     """
     size = np.abs(frame["deformation"].to_numpy())
     beyond = (size >= gear.reach) & ~np.isin(frame.index, [*findings.rows])
@@ -84,11 +67,13 @@ def too_far(
     rising = places[np.argsort(size[places], kind="stable")]
     gears = frame["specimen"].to_numpy()
     farthest = {gears[place]: int(place) for place in rising}
+    radius = f"a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
-    for place in sorted(farthest.values()):
-        words = f"a deformation of {size[place]:g} mm on a radius of "
-        words += f"{gear.geometry.radius:g} mm"
-        yield int(frame.index[place]), words, remedy
+    faults = (
+        (int(frame.index[i]), f"a deformation of {size[i]:g} mm on {radius}", remedy)
+        for i in sorted(farthest.values())
+    )
+    findings.add_rows(faults, column.header)
 
 
 def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
@@ -103,6 +88,6 @@ def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
     # A wild number may overflow here; it has a finding of its own.
     with np.errstate(over="ignore"):
         back = (np.diff(time[order]) < 0) & (np.diff(run[order]) == 0)
-    found = np.zeros(len(time), bool)
-    found[order[1:][back]] = True
-    return found
+    faulty = np.zeros(len(time), bool)
+    faulty[order[1:][back]] = True
+    return faulty

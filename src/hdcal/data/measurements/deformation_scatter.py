@@ -19,14 +19,9 @@ _LEAST_ROWS = 5
 def without_scatter(
     deformation: np.ndarray, force: np.ndarray, run: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return deformation [mm] and force [N] without scatter in the deformation.
+    """Return deformation [mm] and force [N] without scatter in the deformation, (n,).
 
-    The smoothness is chosen by generalised cross-validation.
-
-    Args:
-        deformation: in the order it was taken [mm], shape (n,).
-        force: as read [N], shape (n,).
-        run: index of the mounting, shape (n,).
+    The smoothness is chosen by generalised cross-validation, for each run.
     """
     smooth = np.array(deformation, float)
     for label in np.unique(run):

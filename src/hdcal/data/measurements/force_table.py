@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.measurements.checks import check_rows, check_whole
-from hdcal.data.measurements.measurements import FEWEST_ROWS, READ
+from hdcal.data.measurements.checks import FEWEST_ROWS, check_rows, check_whole
 from hdcal.data.tables.columns import REQUIRED, choose_columns
+from hdcal.data.tables.headers import QUANTITIES
 from hdcal.data.tables.sources import read_source
 from hdcal.data.tables.values import read_values
 
@@ -19,7 +19,7 @@ def read_columns(
     mapping: Mapping[str, str] | None,
     findings: FileFindings,
     *,
-    quantities: Sequence[str] = READ,
+    quantities: Sequence[str] = QUANTITIES,
     required: tuple[str, ...] = REQUIRED,
     fewest: int = FEWEST_ROWS,
 ) -> pd.DataFrame:
@@ -29,18 +29,18 @@ def read_columns(
         data: the file, or a table in memory.
         mapping: quantity -> header with its unit in brackets, or None.
         findings: of the source; gets one for everything that is wrong.
-        quantities: what to look for.
+        quantities: to look for.
         required: which of them must be there.
         fewest: rows that are needed.
 
     Raises:
-        InputError: no table can be found.
+        InputError: there is no table.
     """
     table, _ = read_source(data, findings)
     used = choose_columns(table, mapping or {}, quantities, required, findings)
     values, _ = read_values(table, used, findings)
     frame = pd.DataFrame(values, index=table.rows)
-    check_whole(frame, used, table.filled, fewest, findings)
+    check_whole(frame, used, table, findings, fewest)
     check_rows(frame, used, findings)
     return frame
 
@@ -60,10 +60,10 @@ def read_force(
     both = ("time", "force")
     with FileFindings(str(path)) as findings:
         how: dict = {"quantities": both, "required": both, "fewest": 2}
-        found = read_columns(path, columns, findings, **how)
-        if "time" in found:
+        table = read_columns(path, columns, findings, **how)
+        if "time" in table:
             words = "the time is not later than that of the row before"
             remedy = "Write a jump of the force as two rows a little apart"
-            back = found.index[1:][np.diff(found["time"]) <= 0.0].tolist()
+            back = table.index[1:][np.diff(table["time"]) <= 0.0].tolist()
             findings.add_rows(((row, words, remedy) for row in back), "time")
-    return found["time"].to_numpy(), found["force"].to_numpy()
+    return table["time"].to_numpy(), table["force"].to_numpy()

@@ -1,4 +1,4 @@
-"""Labels of rows: which mounting each was taken on, and what else is stated of it."""
+"""Labels of rows: the mounting of each, its lot, operator, rig and date."""
 
 from collections.abc import Mapping
 from itertools import compress
@@ -15,7 +15,7 @@ TELLING = ("date", "rig", "operator")
 
 
 def mountings(frame: pd.DataFrame) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return the index of each row's mounting, shape (n,), and what each is called.
+    """Return the index of each row's mounting, shape (n,), and the names of mountings.
 
     The same label of a run on two gears is two mountings, and so are the rows before
     and after a jump of a zero.
@@ -57,10 +57,9 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
     table = pd.DataFrame({"gear": gear} | stated)
     index = table.groupby([*table], sort=False).ngroup()
     of_gears: dict[int, tuple[list, list]] = {}
-    gears, each = [], []
+    pairs = []
     for one, *cells in table.drop_duplicates().itertuples(index=False):
-        gears.append(one)
-        each.append(_mounting(*of_gears.setdefault(one, ([], [])), cells))
+        pairs.append((one, _mounting(*of_gears.setdefault(one, ([], [])), cells)))
     known = [whole for whole, _ in of_gears.values()]
     # Not what was the same for all mountings of each gear.
     telling = [
@@ -69,27 +68,24 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
     ]
     if not any(telling):
         return None
-    labels = [" ".join(compress(cells, telling)) for cells in each]
-    return np.array(_distinct(gears, each, labels), object)[index]
-
-
-def _distinct(gears: list, each: list[list[str]], labels: list[str]) -> list[str]:
-    """Return labels of which no two mountings of a gear have the same."""
+    # No two mountings of a gear have the same label.
     taken: dict[tuple, list[str]] = {}
-    found = []
-    for gear, cells, label in zip(gears, each, labels, strict=True):
-        own, count = label, 1
-        while taken.setdefault((gear, own), cells) is not cells:
+    labels = []
+    for one, cells in pairs:
+        label = name = " ".join(compress(cells, telling))
+        count = 1
+        while taken.setdefault((one, label), cells) is not cells:
             count += 1
-            own = f"{label} ({count})"
-        found.append(own)
-    return found
+            label = f"{name} ({count})"
+        labels.append(label)
+    return np.array(labels, object)[index]
 
 
 def _mounting(known: list, loose: list, cells: list[str]) -> list[str]:
     """Return the mounting of a gear that cells state; a new one is added to the known.
 
-    An empty cell states none: of those that the others fit it is the latest.
+    An empty cell states none: of those that the others fit it is the latest. Loose are
+    the known mountings that began with an empty cell.
     """
     empty = NOT_STATED in cells
     # Without an empty cell on either side nothing fits.
@@ -123,14 +119,15 @@ def further_labels(
     Returns:
         The labels, and notes on those that are not used.
     """
-    lots, of_lots = _one_each(frame, "lot", gear, gears)
-    operators, of_operators = _one_each(frame, "operator", run, runs)
-    rigs, of_rigs = _one_each(frame, "rig", run, runs)
     days = frame["date"].to_numpy() if "date" in frame else ()
-    dates, of_dates = dates_of(days, run)
-    found = {"lots": lots, "operators": operators, "rigs": rigs, "dates": dates}
-    notes = of_lots, of_operators, of_rigs, of_dates
-    return found, [note for note in notes if note]
+    each = {
+        "lots": _one_each(frame, "lot", gear, gears),
+        "operators": _one_each(frame, "operator", run, runs),
+        "rigs": _one_each(frame, "rig", run, runs),
+        "dates": dates_of(days, run),
+    }
+    labels = {name: one for name, (one, _) in each.items()}
+    return labels, [note for _, note in each.values() if note]
 
 
 def _one_each(
@@ -138,19 +135,19 @@ def _one_each(
 ) -> tuple[tuple[str, ...], str]:
     """Return the one label of each gear or run, and a note.
 
-    Nothing is returned where the file states none, or one has several, which the note
-    says. An empty cell is filled by the others of its gear or mounting.
+    There are none where the file states none, or one has several, which the note says.
+    An empty cell is filled by the others of its gear or mounting.
     """
     if quantity not in frame:
         return (), ""
-    found: dict[int, set[str]] = {}
+    stated: dict[int, set[str]] = {}
     labels = frame[quantity].astype(str).to_numpy()
     for one, label in dict.fromkeys(zip(index.tolist(), labels, strict=True)):
-        found.setdefault(one, set()).add(label)
-    for one, several in found.items():
-        if len(several - {NOT_STATED}) > 1:
+        stated.setdefault(one, set()).add(label)
+    for one, several in stated.items():
+        several.discard(NOT_STATED)
+        if len(several) > 1:
             word = "specimen" if quantity == "lot" else "run"
             name = quoted(names[one])
             return (), f"{quantity}s are not used: {word} {name} has several"
-    each = (found[one] - {NOT_STATED} for one in sorted(found))
-    return tuple(next(iter(stated), NOT_STATED) for stated in each), ""
+    return tuple(next(iter(stated[one]), NOT_STATED) for one in sorted(stated)), ""

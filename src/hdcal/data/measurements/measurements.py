@@ -11,25 +11,24 @@ from hdcal.data.case import Gear
 from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.measurements.bad_gears import bad_gears, offer
 from hdcal.data.measurements.checks import (
+    FEWEST_ROWS,
+    check_reach,
     check_rows,
     check_whole,
     is_constant,
     rows_back_in_time,
-    too_far,
 )
 from hdcal.data.measurements.labels import mountings, run_labels
 from hdcal.data.measurements.notes import ASSUMED, source_notes
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
-from hdcal.data.tables.headers import DIMENSIONS, LABELS
+from hdcal.data.tables.headers import QUANTITIES
 from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
-from hdcal.errors import Finding, quoted
+from hdcal.errors import Finding, listed, quoted
 from hdcal.quantities import FORCE, TORQUE, Quantities
 
-FEWEST_ROWS = 5
-READ = (*DIMENSIONS, *LABELS)
 # Labels that one finding names.
 _LISTED = 20
 
@@ -42,12 +41,12 @@ class Measurements:
         frame: by quantity, in code units, indexed by the row of the source. Always
             there are deformation, force, and the labels `specimen` and `run`, "1" and
             "" where nothing is stated; `zero` counts the jumps of a zero before a row.
-        file: how findings call the source.
+        file: name of the source in findings.
         sha256: hash of the source.
         stated: quantities that the source states.
         named: quantity -> header with its unit, of headers that are not hdcal's own.
         notes: what was assumed.
-        left_out: gears that are not among them, each with what is wrong with it.
+        left_out: gears that are not among them, each with its fault.
         units: names and units of force and deformation; of a torsional spring they
             are a torque and an angle.
     """
@@ -66,12 +65,12 @@ class Measurements:
         return self.frame[quantity].to_numpy()
 
     def get(self, quantity: str, default: Any = None) -> Any:
-        """Return a column, shape (n,), or what stands for one that is not there."""
+        """Return a column, shape (n,), or the default of one that is not there."""
         return self[quantity] if quantity in self.frame else default
 
     @property
     def rows(self) -> np.ndarray:
-        """What each row is called in the source, shape (n,)."""
+        """Name of each row in the source, shape (n,)."""
         return self.frame.index.to_numpy()
 
     def where(self, kept: np.ndarray) -> "Measurements":
@@ -84,13 +83,13 @@ class Measurements:
 
     @property
     def gears(self) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return the index of each row's gear, shape (n,), and what each is called."""
+        """Index of each row's gear, shape (n,), and the names of gears."""
         index, names = pd.factorize(self.frame["specimen"])
         return index, tuple(names)
 
     @property
     def runs(self) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Return the index of each row's mounting, shape (n,), and its name."""
+        """Index of each row's mounting, shape (n,), and the names of mountings."""
         return mountings(self.frame)
 
 
@@ -109,26 +108,25 @@ def read_measurements(
         data: the file, or a table in memory (see `read_source`).
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
-        encoding: of the text; by default what it looks like.
+        encoding: of the text; by default the likeliest.
         sheet: of a workbook; by default the one with readings.
         gear: whose radius bounds the deformations; None where it is not known.
-        skip_bad: leave out gears of which a row is wrong, whole; False: refuse them,
-            and say that this can be asked for.
+        skip_bad: leave out gears with a faulty row, whole; False: refuse them, and
+            say that this can be asked for.
 
     Raises:
         InputError: holds everything that is wrong with the source.
     """
     with FileFindings(source_name(data)) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
-        chosen = choose_columns(table, mapping or {}, READ, REQUIRED, findings)
+        chosen = choose_columns(table, mapping or {}, QUANTITIES, REQUIRED, findings)
         used = in_place_of_force(chosen)
         table, used, notes = without_slow_channels(table, used, REQUIRED)
-        found = measured_in(table, used, findings, gear, skip_bad=skip_bad)
-    used = {name: column for name, column in used.items() if name in found.stated}
-    notes = source_notes(table, used, [*notes, *found.notes])
-    return replace(
-        found, sha256=sha256, named=as_named(table, used), notes=tuple(notes)
-    )
+        read = measured_in(table, used, findings, gear, skip_bad=skip_bad)
+    used = {name: column for name, column in used.items() if name in read.stated}
+    every = source_notes(table, used, [*notes, *read.notes])
+    named = as_named(table, used)
+    return replace(read, sha256=sha256, named=named, notes=tuple(every))
 
 
 def measured_in(
@@ -140,7 +138,7 @@ def measured_in(
     skip_bad: bool | None = None,
     whole: bool = True,
 ) -> Measurements:
-    """Return what stands in the columns of a table; its notes are of cells alone.
+    """Return the measurements in the columns of a table, with notes on cells alone.
 
     Gears that are left out count as if they had never been in the file: what is guessed
     of cells, such as their decimal sign, is guessed of all the others.
@@ -157,19 +155,19 @@ def measured_in(
     while True:
         wrong = FileFindings(findings.file)
         wrong.places = findings.places
-        found = _measured(table, used, wrong, gear, whole=whole)
-        gears = found["specimen"] if wrong.rows else []
+        read = _measured(table, used, wrong, gear, whole=whole)
+        gears = read["specimen"] if wrong.rows else []
         bad = bad_gears(wrong, table.rows, gears)
         many = len({*gears} - {""})
         if not skip_bad or not bad or (whole and len(bad) == many):
             break
         left_out |= bad
-        table = table.take(~found.frame["specimen"].isin([*bad]).to_numpy())
+        table = table.take(~read.frame["specimen"].isin([*bad]).to_numpy())
     findings += wrong
     findings.rows |= wrong.rows
     if skip_bad is False and bad and (len(bad) < many or not whole):
         findings.append(offer(bad, many if whole else None))
-    return replace(found, left_out=left_out)
+    return replace(read, left_out=left_out)
 
 
 def _measured(
@@ -180,14 +178,14 @@ def _measured(
     *,
     whole: bool,
 ) -> Measurements:
-    """Return what stands in columns, right or wrong: the findings say."""
+    """Return the measurements in columns, right or wrong: the findings say."""
     values, notes = read_values(table, used, findings)
     if table.runs is not None and "run" not in used:
         values["run"] = np.char.mod("%d", table.runs + 1).astype(object)
         notes.append("the readings below each row of headers are a run")
     frame = pd.DataFrame(values, index=table.rows)
     if whole:
-        check_whole(frame, used, table.filled, FEWEST_ROWS, findings)
+        check_whole(frame, used, table, findings)
     check_rows(frame, used, findings)
     stated = frozenset(values)
     one = np.zeros(len(frame), np.int8)
@@ -198,41 +196,38 @@ def _measured(
     frame["zero"] = 0
     force = used.get("force")
     units = TORQUE if force is not None and force.quantity == "torque" else FORCE
-    found = Measurements(frame, findings.file, stated=stated, units=units)
-    found, note = _with_time(found, used, findings)
+    read = Measurements(frame, findings.file, stated=stated, units=units)
+    read, note = _with_time(read, used, findings)
     if gear is not None and "deformation" in used:
-        far = too_far(frame, gear, findings)
-        findings.add_rows(far, used["deformation"].header)
-    return replace(found, notes=(*note, *(f"{ASSUMED}{one}" for one in notes)))
+        check_reach(frame, used["deformation"], gear, findings)
+    return replace(read, notes=(*note, *(f"{ASSUMED}{one}" for one in notes)))
 
 
 def _with_time(
-    found: Measurements, used: Mapping[str, Column], findings: FileFindings
+    read: Measurements, used: Mapping[str, Column], findings: FileFindings
 ) -> tuple[Measurements, list[str]]:
     """Return measurements with a time that never goes back within a run, or without.
 
     A time that goes back is refused where the user names it, or a header `time_UNIT`,
     and not used where its header was guessed. A note says so.
     """
-    if "time" not in found.frame:
-        return found, []
-    index, names = found.runs
-    back = rows_back_in_time(found["time"], index)
+    if "time" not in read.frame:
+        return read, []
+    index, names = read.runs
+    back = rows_back_in_time(read["time"], index)
     if not back.any():
-        return found, []
+        return read, []
     label = quoted(names[index[int(np.argmax(back))]])
     words = f"the time goes back within {f'run {label}' if len(names) > 1 else 'a run'}"
-    header, rows = used["time"].header, found.frame.index[back].tolist()
+    header, rows = used["time"].header, read.frame.index[back].tolist()
     if not used["time"].guessed:
         remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
         findings.add_rows(((row, words, remedy) for row in rows), header)
-        return found, []
+        return read, []
     note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {row_list(rows)}. If "
     note += "the rig was reset there, label the runs in a column 'run'"
-    without = replace(
-        found, frame=found.frame.drop(columns="time"), stated=found.stated - {"time"}
-    )
-    return without, [note]
+    frame = read.frame.drop(columns="time")
+    return replace(read, frame=frame, stated=read.stated - {"time"}), [note]
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
@@ -242,20 +237,17 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
         InputError: none is called so, or it has too few rows, or was not moved.
     """
     findings, (_, names) = FileFindings(measured.file), measured.gears
+    name = quoted(label)
     if label not in names:
-        listed = ", ".join(map(quoted, names[:_LISTED]))
-        more = len(names) - _LISTED
-        listed += f" and {more} more" if more > 0 else ""
-        words = f"no specimen is called {quoted(label)}"
+        remedy = f"There are {listed([*map(quoted, names)], _LISTED)}"
         if len(names) == 1:
-            findings.refuse(words, "Say `columns` 'specimen=HEADER', which names them")
-        findings.refuse(words, f"There are {listed}")
-    found = measured.where((measured.frame["specimen"] == label).to_numpy())
-    if len(found.frame) < FEWEST_ROWS:
-        words = f"specimen {quoted(label)} has {len(found.frame)} rows"
+            remedy = "Say `columns` 'specimen=HEADER', which names them"
+        findings.refuse(f"no specimen is called {name}", remedy)
+    one = measured.where((measured.frame["specimen"] == label).to_numpy())
+    if len(one.frame) < FEWEST_ROWS:
+        words = f"specimen {name} has {len(one.frame)} rows"
         findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
-    if is_constant(found["deformation"]):
-        moved = measured.units.displacement
-        words = f"the {moved} of specimen {quoted(label)} is constant"
+    if is_constant(one["deformation"]):
+        words = f"the {measured.units.displacement} of specimen {name} is constant"
         findings.refuse(words, "Measure at several")
-    return found
+    return one

@@ -15,23 +15,17 @@ from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted
 from hdcal.quantities import Quantities
 
-# How a note begins that says what was assumed.
+# First word of a note on what was assumed.
 ASSUMED = "ASSUMED: "
-MOST_ROWS = 8  # listed in one note
-USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
-THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
+_MOST_ROWS = 8  # listed in one note
+_USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
+_THIN = 0.1  # largest wall over radius that textbooks call a thin-walled cylinder
 
 
 def source_notes(
     table: ReadTable, used: Mapping[str, Column], others: Sequence[str] = ()
 ) -> list[str]:
-    """Return what was assumed of a source, and what of it is not used.
-
-    Args:
-        table: its readings.
-        used: columns by quantity.
-        others: further notes.
-    """
+    """Return what was assumed of a source, other notes, and what of it is not used."""
     notes = [*_assumed(table, used), *table.left_out, *others]
     return [*notes, *_unused_columns(table, used)]
 
@@ -47,33 +41,32 @@ def _assumed(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
                 f"stated, though it names {column.against}"
             )
     guesses = [column for column in used.values() if column.guessed]
+    meanings = [
+        f"{quoted(column.header)} is the {column.quantity}"
+        + ("" if column.unit is None else f" in {column.unit.name}")
+        for column in guesses
+    ]
     if guesses:
-        meanings = ", ".join(
-            f"{quoted(column.header)} is the {column.quantity}"
-            + ("" if column.unit is None else f" in {column.unit.name}")
-            for column in guesses
-        )
-        first = guesses[0]
-        form = "HEADER" if first.unit is None else "HEADER[UNIT]"
-        option = f"--column '{first.quantity}={form}'"
-        yield f"{ASSUMED}{meanings}. If not, name the column: {option}"
+        form = "HEADER" if guesses[0].unit is None else "HEADER[UNIT]"
+        option = f"--column '{guesses[0].quantity}={form}'"
+        yield f"{ASSUMED}{', '.join(meanings)}. If not, name the column: {option}"
 
 
 def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
     """Yield what of a file was not read."""
     positions = {column.position for column in used.values()}
     quantities = {column.quantity for column in used.values()}
-    headers = [*enumerate(table.headers)]
+    headers = enumerate(table.headers)
     extra = [header for place, header in headers if place not in positions and header]
     for header in extra:
-        found = parse_header(header)
-        label = found.quantity in LABELS
-        named = found.quantity and found.quantity not in quantities
-        if named and (label or not found.unit):
+        meant = parse_header(header)
+        label = meant.quantity in LABELS
+        named = meant.quantity and meant.quantity not in quantities
+        if named and (label or not meant.unit):
             why = "differs from row to row" if label else "names no unit"
-            option = f"'{found.quantity}={header}{'' if label else '[UNIT]'}'"
+            option = f"'{meant.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (
-                f"{ASSUMED}{quoted(header)}, which may be the {found.quantity}, is not "
+                f"{ASSUMED}{quoted(header)}, which may be the {meant.quantity}, is not "
                 f"used, as it {why}. Name the column to use it: --column {option}"
             )
     if extra:
@@ -83,14 +76,9 @@ def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[st
 
 
 def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
-    """Yield what is unusual of a gear file, or at odds with its readings.
-
-    Args:
-        gear: as its file states it.
-        force: as read [N], shape (n,).
-    """
+    """Yield what is unusual of a gear file, or at odds with forces [N], shape (n,)."""
     size, step = gear.geometry, gear.force_resolution
-    if gear.theory != SPRING and float(size.wall_thickness / size.radius) > THIN:
+    if gear.theory != SPRING and float(size.wall_thickness / size.radius) > _THIN:
         yield (
             f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
             "is not thin, as the theories take it to be. Check both sizes, and units"
@@ -105,7 +93,8 @@ def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
     """Yield that temperatures [°C], shape (n,), are those of no rig."""
     if temperature is None:
         return
-    if not USUAL[0] <= (typical := np.median(temperature)) <= USUAL[1]:
+    low, high = _USUAL
+    if not low <= (typical := np.median(temperature)) <= high:
         yield (
             f"temperatures about {typical:.4g} °C are far from those of any "
             "rig. Check the unit of the column"
@@ -113,19 +102,13 @@ def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
 
 
 def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator[str]:
-    """Yield that the deformation was reset.
-
-    Args:
-        motion: of the readings.
-        rows: what each is called in its source, shape (n,).
-        units: of what was measured.
-    """
+    """Yield that the deformation was reset; rows are the names of rows, shape (n,)."""
     if motion.resets:
-        few = [str(rows[row]) for row in motion.resets[:MOST_ROWS]]
-        more = ", …" if len(motion.resets) > MOST_ROWS else ""
+        few = ", ".join(str(rows[row]) for row in motion.resets[:_MOST_ROWS])
+        few += ", …" if len(motion.resets) > _MOST_ROWS else ""
         yield (
             f"the {units.displacement} goes back over most of its range in one step "
-            f"(row {', '.join(few)}{more}), which counts as no measured "
+            f"(row {few}), which counts as no measured "
             "unloading. Where a new mounting begins there, say so in a column `run`"
         )
 
@@ -135,15 +118,15 @@ def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[st
 
     Args:
         stated: quantities that the source states.
-        runs: how many mounting there are.
-        gears: of how many gears.
+        runs: number of mountings.
+        gears: number of gears.
     """
-    telling = ", ".join(name for name in TELLING if name in stated)
+    telling = [name for name in TELLING if name in stated]
     if "run" in stated or runs <= gears or not telling:
         return
-    telling = " or ".join(telling.rsplit(", ", 1))
+    differ = " or ".join(", ".join(telling).rsplit(", ", 1))
     yield (
-        f"{ASSUMED}without a column `run`, rows of a gear that differ in {telling} are "
+        f"{ASSUMED}without a column `run`, rows of a gear that differ in {differ} are "
         f"of different mountings: {runs} mountings of {gears} "
         f"gear{'s' if gears > 1 else ''}. "
         "If not, name the mountings in a column `run`"
@@ -151,12 +134,7 @@ def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[st
 
 
 def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
-    """Yield that several rigs read one gear.
-
-    Args:
-        rigs: of all rows or runs.
-        gears: how many gears they read.
-    """
+    """Yield that several rigs, of all rows or runs, read one gear."""
     many = len({*rigs} - {NOT_STATED})
     if gears == 1 and many > 1:
         yield (

@@ -166,7 +166,7 @@ def read_batches(
 def _whole_gears(
     dataset: "Dataset", headers: list[str], specimen: int
 ) -> Iterator[tuple[int, "Table"]]:
-    """Yield rows that do not end within those of a gear, and the number of the first."""
+    """Yield rows that end with those of a gear, and the number of the first."""
     import pyarrow
 
     held, first = None, 1

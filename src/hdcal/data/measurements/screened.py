@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.data.measurements.bad_gears import among, offer
+from hdcal.data.measurements.checks import FEWEST_ROWS
 from hdcal.data.measurements.deformation_scatter import without_scatter
-from hdcal.data.measurements.measurements import FEWEST_ROWS, Measurements
+from hdcal.data.measurements.measurements import Measurements
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
@@ -20,7 +21,7 @@ from hdcal.screening.working_range import (
     read_range,
 )
 
-# Findings that are spelled out.
+# Findings of a record that are listed.
 _LISTED = 50
 
 
@@ -58,54 +59,59 @@ def screened(
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
     units = measured.units
-    found = screen(x, measured["force"], measured.get("time"), run, whole=whole)
-    if found.asked:
-        gears = measured["specimen"]
-        questions = [
-            Finding(measured.file, *question(one, rows, units)) for one in found.asked
-        ]
-        bad: dict[str, Finding] = {}
-        for one, finding in zip(found.asked, questions, strict=True):
-            bad.setdefault(str(gears[one.rows[0][0]]), finding)
-        many = len({*gears})
-        if skip_bad and (len(bad) < many or not whole):
-            left = measured.where(~among(gears, bad))
-            left = replace(left, left_out={**measured.left_out, **bad})
-            return screened(left, wanted, whole=whole)
-        offered = skip_bad is False and (len(bad) < many or not whole)
-        offers = [offer(bad, many if whole else None)] if offered else []
-        raise InputError([*questions, *offers])
+    result = screen(x, measured["force"], measured.get("time"), run, whole=whole)
+    if result.asked:
+        left = _without_asked(measured, result, skip_bad, whole=whole)
+        return screened(left, wanted, whole=whole)
     if wanted is not None:
-        if wanted.unit == STRAIGHT and found.straight is None:
+        if wanted.unit == STRAIGHT and result.straight is None:
             words = "is straight, and the data are of several runs, or of cycles whose "
             words += "movements are no straight lines"
             raise InputError([Finding("range", words, FORM)])
-        found = in_range(found, wanted, run, units)
-    observations = tuple(
-        in_words(one, rows, found.working_range, units) for one in found.observations
-    )
-    found = replace(found, observations=observations)
-    kept = int(found.kept.sum())
+        result = in_range(result, wanted, run, units)
+    reach, each = result.working_range, result.observations
+    words = tuple(in_words(one, rows, reach, units) for one in each)
+    result = replace(result, observations=words)
+    kept = int(result.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):
         problem = f"{kept} of {run.size} rows are left"
         problem += f" between {wanted.words(units)}" if wanted is not None else ""
         remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
-        remedy += f"read from {ends}"
-        raise InputError([Finding(measured.file, problem, remedy)])
-    moved = {"deformation": found.deformation, "force": found.force, "zero": found.zero}
-    if found.time is not None:
-        moved["time"] = found.time
-    kept_rows = measured.assign(**moved).where(found.kept)
-    return _without_scatter(kept_rows, run[found.kept], found), found
+        raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
+    columns = ("deformation", "force", "zero", "time")
+    moved = {name: getattr(result, name) for name in columns}
+    moved = {name: values for name, values in moved.items() if values is not None}
+    left = measured.assign(**moved).where(result.kept)
+    return _without_scatter(left, run[result.kept], result), result
+
+
+def _without_asked(
+    measured: Measurements, result: Screening, skip_bad: bool | None, *, whole: bool
+) -> Measurements:
+    """Return measurements without gears about which only the user can decide."""
+    gears = measured["specimen"]
+    questions, bad = [], {}
+    for one in result.asked:
+        asked = question(one, measured.rows, measured.units)
+        questions.append(Finding(measured.file, *asked))
+        bad.setdefault(str(gears[one.rows[0][0]]), questions[-1])
+    many = len({*gears})
+    some = len(bad) < many or not whole
+    if skip_bad and some:
+        left = measured.where(~among(gears, bad))
+        return replace(left, left_out={**measured.left_out, **bad})
+    if skip_bad is False and some:
+        questions.append(offer(bad, many if whole else None))
+    raise InputError(questions)
 
 
 def _without_scatter(
-    measured: Measurements, run: np.ndarray, found: Screening
+    measured: Measurements, run: np.ndarray, result: Screening
 ) -> Measurements:
-    """Return rows without the scatter of the deformation, of runs that show it."""
+    """Return the kept rows without the scatter of the deformation, where it shows."""
     x, force = measured["deformation"].copy(), measured["force"].copy()
-    shaken = {o.run for o in found.observations if o.action == "smoothed"}
+    shaken = {o.run for o in result.observations if o.action == "smoothed"}
     for index in shaken:
         rows = np.flatnonzero(run == index)
         zero = measured["zero"][rows]
@@ -113,14 +119,9 @@ def _without_scatter(
     return measured.assign(deformation=x, force=force) if shaken else measured
 
 
-def screening_notes(found: Screening, units: Quantities) -> list[str]:
-    """Return what was found in a record, each finding in one sentence.
-
-    Args:
-        found: its screening.
-        units: of what was measured.
-    """
-    notes = [one.words for one in found.observations]
+def screening_notes(result: Screening, units: Quantities) -> list[str]:
+    """Return the findings of a screening, each in one sentence."""
+    notes = [one.words for one in result.observations]
     more = [f"and {len(notes) - _LISTED} more findings"] if notes[_LISTED:] else []
-    hidden = [hidden_direction(units)] if found.trembling else []
+    hidden = [hidden_direction(units)] if result.trembling else []
     return [*notes[:_LISTED], *more, *hidden]

@@ -1,4 +1,4 @@
-"""Grids of arrays: DataFrames, and MATLAB's .mat up to version 7."""
+"""Grids of arrays: DataFrames, columns of Arrow, and MATLAB's .mat up to version 7."""
 
 import hashlib
 from collections import Counter
@@ -21,22 +21,17 @@ NAME = "DataFrame"
 _FEWEST = 5
 
 
-def array_grid(names: Sequence[str], columns: Sequence[np.ndarray]) -> ArrayGrid:
+def _array_grid(names: Sequence[str], columns: Sequence[np.ndarray]) -> ArrayGrid:
     """Return a grid of columns, shape (n,) each, below a row of their names.
 
     Columns that are only counted have no headers: they are asked for by number.
     """
-    rows = len(columns[0]) if columns else 0
+    rows = np.arange(len(columns[0]) if columns else 0)
     counted = all(name.isdigit() for name in names)
     header = [] if counted else [SourceLine(1, [*names], fits=True)]
-    numeric = [i for i, one in enumerate(columns) if one.dtype.kind in "iuf"]
-    return ArrayGrid(
-        rows=np.arange(rows) + (1 if counted else 2),
-        width=len(columns),
-        loose=header,
-        load=columns.__getitem__,
-        numeric=frozenset(numeric),
-    )
+    numeric = frozenset(i for i, one in enumerate(columns) if one.dtype.kind in "iuf")
+    first = 1 if counted else 2
+    return ArrayGrid(rows + first, len(columns), header, columns.__getitem__, numeric)
 
 
 def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
@@ -66,16 +61,14 @@ def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     names = [str(name) for name in frame.columns]
-    columns = [plain_column(frame.iloc[:, i]) for i in range(len(names))]
+    columns = [_plain_column(frame.iloc[:, i]) for i in range(len(names))]
     digest = hashlib.sha256("\t".join(names).encode())
     for column in columns:
-        text = column.dtype == object
-        digest.update(
-            "\n".join(map(stored_text, column.tolist())).encode()
-            if text
-            else column.tobytes()
-        )
-    return array_grid(names, columns), digest.hexdigest()
+        if column.dtype == object:
+            digest.update("\n".join(map(stored_text, column.tolist())).encode())
+        else:
+            digest.update(column.tobytes())
+    return _array_grid(names, columns), digest.hexdigest()
 
 
 def arrow_grid(
@@ -91,39 +84,34 @@ def arrow_grid(
     Args:
         schema: of the columns; nested ones are no cells.
         arrow: returns a column by its name.
-        rows: how many there are.
-        first: what the first one is called.
-        days: whether of times the day alone is read, as clocks there showed it.
+        rows: their number.
+        first: number of the first one.
+        days: whether of times the day alone is read, in their own time zone.
     """
     from pyarrow import types
 
     plain = [field for field in schema if not types.is_nested(field.type)]
-    kinds = types.is_integer, types.is_floating
+    kinds = [field.type for field in plain]
     numeric = frozenset(
         place
-        for place, field in enumerate(plain)
-        if any(kind(field.type) for kind in kinds)
+        for place, kind in enumerate(kinds)
+        if types.is_integer(kind) or types.is_floating(kind)
     )
 
     def load(place: int) -> np.ndarray:
-        kind, cells = plain[place].type, arrow(plain[place].name)
+        kind, cells = kinds[place], arrow(plain[place].name)
         if days and types.is_timestamp(kind):
             times = cells.to_pandas().dt.tz_localize(None)
-            return plain_column(times.dt.normalize().astype("category"))
+            return _plain_column(times.dt.normalize().astype("category"))
         if place not in numeric and not types.is_dictionary(kind):
             cells = cells.dictionary_encode()
-        return plain_column(cells.to_pandas())
+        return _plain_column(cells.to_pandas())
 
-    return ArrayGrid(
-        rows=np.arange(rows) + first,
-        width=len(plain),
-        loose=[SourceLine(first - 1, [field.name for field in plain], fits=True)],
-        load=load,
-        numeric=numeric,
-    )
+    header = SourceLine(first - 1, [field.name for field in plain], fits=True)
+    return ArrayGrid(np.arange(rows) + first, len(plain), [header], load, numeric)
 
 
-def plain_column(column: "pd.Series") -> np.ndarray:
+def _plain_column(column: "pd.Series") -> np.ndarray:
     """Return a column of a DataFrame as numbers, or as objects: texts and numbers."""
     import pandas as pd
 
@@ -131,69 +119,70 @@ def plain_column(column: "pd.Series") -> np.ndarray:
     if types.is_numeric_dtype(column) and not types.is_bool_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
     if isinstance(column.dtype, pd.CategoricalDtype):
-        cells = plain_column(column.cat.categories.to_series())
+        cells = _plain_column(column.cat.categories.to_series())
         # The code of an empty cell is -1.
         return np.append(cells.astype(object), "")[column.cat.codes]
     objects = column.astype(object).where(column.notna(), "").to_numpy()
     kinds = str, int, float
-    return np.array(
-        [c if isinstance(c, kinds) and c is not True else str(c) for c in objects],
-        object,
-    )
+    cells = [c if isinstance(c, kinds) and c is not True else str(c) for c in objects]
+    return np.array(cells, object)
 
 
 def mat_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[str]]:
-    """Return the vectors of one length in a .mat file, or the columns of a matrix."""
+    """Return the vectors of one length in a .mat file, or the columns of a matrix.
+
+    Raises:
+        InputError: it holds no one table.
+    """
     from scipy.io import loadmat
 
     try:
-        held = loadmat(path, simplify_cells=True)
+        content = loadmat(path, simplify_cells=True)
     except Exception as error:  # whatever a parser makes of a broken file
         words = f"is no .mat file that can be read ({error})"
         findings.refuse(words, "Save it anew")
-    found = [*_arrays(held)]
-    twice = [name for name, many in Counter(n for n, _ in found).items() if many > 1]
+    named = [*_arrays(content)]
+    twice = [name for name, many in Counter(n for n, _ in named).items() if many > 1]
     if twice:
         words = f"holds {', '.join(map(quoted, twice))} more than once"
         findings.refuse(words, "Save one run in a file, or give each a name")
-    arrays = dict(found)
-    vectors = {name: array for name, array in arrays.items() if array.ndim == 1}
+    vectors = {name: array for name, array in named if array.ndim == 1}
+    matrices = [(name, array) for name, array in named if array.ndim == 2]
     lengths = Counter(map(len, vectors.values()))
     usual = [size for size, many in lengths.items() if many > 1]
-    matrices = {name: array for name, array in arrays.items() if array.ndim == 2}
     if len(usual) == 1:
         taken = {n: a for n, a in vectors.items() if len(a) == usual[0]}
-        left = [*_not_taken(held, taken)]
+        left = [*_not_taken(content, taken)]
         note = f"not read of the file: {', '.join(map(quoted, left))}"
-        return array_grid([*taken], [*taken.values()]), [note] if left else []
+        return _array_grid([*taken], [*taken.values()]), [note] if left else []
     if not usual and len(matrices) == 1:
-        ((name, matrix),) = matrices.items()
+        name, matrix = matrices[0]
         names = [str(k + 1) for k in range(matrix.shape[1])]
         note = f"the matrix {quoted(name)} holds the readings"
-        return array_grid(names, [*matrix.T]), [note]
-    names = ", ".join(map(quoted, arrays))
-    words = f"holds no one table of readings: {names or 'no arrays'}"
+        return _array_grid(names, [*matrix.T]), [note]
+    names = ", ".join(quoted(name) for name, _ in named) or "no arrays"
+    words = f"holds no one table of readings: {names}"
     findings.refuse(words, "Save vectors of one length, and nothing else")
 
 
-def _not_taken(held: Mapping[str, Any], taken: Mapping[str, Any]) -> Iterator[str]:
+def _not_taken(content: Mapping[str, Any], taken: Mapping[str, Any]) -> Iterator[str]:
     """Yield the variables of a .mat file that are not among the readings."""
-    for name, value in held.items():
+    for name, value in content.items():
         inside = isinstance(value, dict) and {*value} <= {*taken}
         if name not in taken and not name.startswith("__") and not inside:
             yield name
 
 
-def _arrays(held: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+def _arrays(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
     """Yield the arrays of numbers in variables and structures, by name."""
-    if isinstance(held, dict):
-        for key, value in held.items():
+    if isinstance(content, dict):
+        for key, value in content.items():
             if not key.startswith("__"):
                 yield from _arrays(value, key)
     elif (
-        isinstance(held, np.ndarray)
-        and held.dtype.kind in "iuf"
-        and held.ndim in (1, 2)
-        and len(held) >= _FEWEST
+        isinstance(content, np.ndarray)
+        and content.dtype.kind in "iuf"
+        and content.ndim in (1, 2)
+        and len(content) >= _FEWEST
     ):
-        yield name, held
+        yield name, content

@@ -4,9 +4,10 @@ A column is read where its header, or the user, names it. Where several may be m
 a unit is missing, that is asked; nothing is guessed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
-from itertools import pairwise
+
+import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable
@@ -25,7 +26,7 @@ from hdcal.errors import quoted
 REQUIRED = ("deformation", "force")
 # Of a torsional spring, in the same order.
 _TURNING = ("angle", "torque")
-# Beside other columns these are asked for where the user has to choose.
+# Columns that are listed where the user has to choose.
 _SHOWN = 12
 
 
@@ -36,18 +37,17 @@ def choose_columns(
     required: Sequence[str],
     findings: FileFindings,
 ) -> dict[str, Column]:
-    """Find each quantity's column by its name, or by what the user said.
+    """Return each quantity's column by its header, or as the user named it.
+
+    Where deformation and force are required and the source holds torques and no forces,
+    these are angle and torque.
 
     Args:
         table: whose headers are read.
         mapping: quantity -> header with the unit in square brackets.
-        quantities: what to look for.
+        quantities: to look for.
         required: which of them must be there.
-        findings: of the file; gets one for each header that is wrong or missing.
-
-    Returns:
-        The columns by quantity; where deformation and force are required and the source
-        holds torques and no forces, these are angle and torque.
+        findings: gets one for each header that is wrong or missing.
 
     Raises:
         InputError: there are no headers, and the user names no column by its number.
@@ -80,14 +80,10 @@ def choose_columns(
 
 
 def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
-    """Return columns in which torque and angle stand for force and deformation.
-
-    Args:
-        used: columns by quantity, of `choose_columns`.
-    """
+    """Return chosen columns with torque and angle in place of force and deformation."""
     if "torque" not in used:
         return dict(used)
-    names: dict[str, str] = dict(zip(_TURNING, REQUIRED, strict=True))
+    names = {"angle": "deformation", "torque": "force"}
     return {names.get(quantity, quantity): column for quantity, column in used.items()}
 
 
@@ -101,12 +97,11 @@ def _check_names(
         remedy = "Say which column is which by its number, as in `columns` "
         remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
         findings.refuse(words, remedy, table.header_row)
-    for quantity in mapping:
-        if quantity not in QUANTITIES:
-            near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
-            hint = f"Did you mean {near[0]}? " if near else ""
-            words = f"`columns` {quantity}=… names no quantity that hdcal knows"
-            findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
+    for quantity in (name for name in mapping if name not in QUANTITIES):
+        near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        words = f"`columns` {quantity}=… names no quantity that hdcal knows"
+        findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
 
 
 class _Chooser:
@@ -115,9 +110,6 @@ class _Chooser:
     def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings
         self._headers = [*map(parse_header, table.headers)]
-        self._filled = [
-            place for place in range(len(self._headers)) if place not in table.empty
-        ]
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
         """Return the only column of a quantity; more than one is asked about."""
@@ -137,8 +129,7 @@ class _Chooser:
         fitting = [p for p in named if self._headers[p].measures(quantity)]
         if not needed:
             # One that names nothing else is meant rather than one that says more.
-            whole = [p for p in fitting if self._headers[p].whole]
-            chosen = whole or fitting
+            chosen = [p for p in fitting if self._headers[p].whole] or fitting
             return self._column(quantity, chosen[0]) if len(chosen) == 1 else None
         # A gauge may be called by its serial number.
         nameless = self._where(
@@ -157,23 +148,43 @@ class _Chooser:
 
     def is_torsion(self) -> bool:
         """Tell whether a column holds a torque, and none a force."""
-        named = {
-            quantity
-            for quantity in ("force", "torque")
-            if self._where(lambda h, q=quantity: h.quantity == q and h.measures(q))
-        }
-        return named == {"torque"}
+
+        def holds(name: str) -> bool:
+            return bool(self._where(lambda h: h.quantity == name and h.measures(name)))
+
+        return holds("torque") and not holds("force")
 
     def label(self, quantity: str) -> Column | None:
         """Return the only column of labels; which run or specimen is meant is asked."""
-        found = _label_columns(self._table, self._headers, quantity)
-        if len(found) > 1 and quantity in ("run", "specimen"):
-            self._ask_which(quantity, found)
-        return self._column(quantity, found[0]) if len(found) == 1 else None
+        places = self._label_places(quantity)
+        if len(places) > 1 and quantity not in GROUPINGS:
+            self._ask_which(quantity, places)
+        return self._column(quantity, places[0]) if len(places) == 1 else None
 
-    def _where(self, fits) -> list[int]:
+    def _label_places(self, quantity: str) -> list[int]:
+        """Return the places of the labels of a quantity, by headers and cells.
+
+        Of columns that tell the same rows apart the first one, and of those that tell
+        none apart one only where no other does.
+        """
+        headers = self._headers
+        named = [i for i, header in enumerate(headers) if header.quantity == quantity]
+        if exact := [i for i in named if headers[i].exact]:
+            return exact
+        kinds: dict[bytes, int] = {}
+        for place in [i for i in named if headers[i].whole] or named:
+            index, texts = self._table.grid.labels(place)
+            # A number for each reading is no label of a run or a gear; a run lasts.
+            counted = quantity == "run" and bool((np.diff(index) != 0).all())
+            if quantity not in GROUPINGS and (counted or len(texts) >= len(index)):
+                continue
+            kinds.setdefault(index.tobytes() if len(texts) > 1 else b"", place)
+        return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
+
+    def _where(self, fits: Callable[[Header], bool]) -> list[int]:
         """Return the columns whose header fits, without those that have no cells."""
-        return [place for place in self._filled if fits(self._headers[place])]
+        headers, empty = enumerate(self._headers), self._table.empty
+        return [place for place, h in headers if place not in empty and fits(h)]
 
     def _column(self, quantity: str, place: int) -> Column:
         header = self._headers[place]
@@ -187,29 +198,29 @@ class _Chooser:
 
     def _ask_which(self, quantity: str, places: Sequence[int]) -> None:
         names = [quoted(self._table.headers[place]) for place in places]
+        option = f"`columns` '{quantity}={places[0] + 1}'"
         if len(places) == 1:
             words = f"no header names the {quantity}, which {names[0]} may hold"
-            remedy = f"If so, say `columns` '{quantity}={places[0] + 1}'"
+            remedy = f"If so, say {option}"
         else:
             words = f"the {quantity} may be {', '.join(names[:-1])} or {names[-1]}"
             numbers = ", ".join(str(place + 1) for place in places)
-            remedy = f"Say which, by its number: `columns` '{quantity}={places[0] + 1}'"
+            remedy = f"Say which, by its number: {option}"
             remedy += f"; the numbers are {numbers}" if len(places) > 2 else ""
         self._add(words, remedy, places[min(1, len(places) - 1)])
 
     def _ask_unit(self, quantity: str, place: int) -> None:
-        header, text = self._headers[place], self._table.headers[place]
+        unit, text = self._headers[place].unit_text, self._table.headers[place]
         words = f"may be the {quantity}, but the header names no unit"
-        if header.unit_text:
-            words = f"unknown unit {quoted(header.unit_text)} of the {quantity}"
-        name = text.removesuffix(f"[{header.unit_text}]").rstrip()
-        advice = unit_advice(header.unit_text, quantity)
-        weight = weight_unit(header.unit_text) if quantity == "force" else ""
+        if unit:
+            words = f"unknown unit {quoted(unit)} of the {quantity}"
+        name = text.removesuffix(f"[{unit}]").rstrip()
+        weight = weight_unit(unit) if quantity == "force" else ""
         option = f"`columns` '{quantity}={name}[{weight or 'UNIT'}]'"
-        self._add(words, f"Say {option}; {advice}", place)
+        self._add(words, f"Say {option}; {unit_advice(unit, quantity)}", place)
 
     def _refuse_missing(self, quantity: str) -> None:
-        """Add that no column holds a quantity, with what might."""
+        """Add that no column holds a quantity, with one that might."""
         words, option = f"no column holds the {quantity}", f"`columns` '{quantity}="
         headers = self._table.headers
         shown = ", ".join(quoted(header) for header in headers[:_SHOWN] if header)
@@ -242,31 +253,3 @@ def _refuse_conflicts(
             words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
             remedy = "Leave one of them out"
             findings.add(f"{words}units {unit}", remedy, table.unit_row)
-
-
-def _label_columns(
-    table: ReadTable, headers: Sequence[Header], quantity: str
-) -> list[int]:
-    """Return where the labels of a quantity stand, by headers and cells.
-
-    Of columns that tell the same rows apart the first one, and of those that tell none
-    apart one only where no other does. More than one: headers do not say which.
-    """
-    found = [i for i, header in enumerate(headers) if header.quantity == quantity]
-    exact = [i for i in found if headers[i].exact]
-    if exact:
-        return exact
-    # One that names nothing else is meant rather than one that says more.
-    found = [i for i in found if headers[i].whole] or found
-    kinds: dict[tuple, int] = {}
-    for place in found:
-        labels = table.grid.texts(place)
-        names = {label: index for index, label in enumerate(dict.fromkeys(labels))}
-        if quantity not in GROUPINGS:
-            # A number for each reading is no label of a run or a gear; a run lasts.
-            counted = quantity == "run" and all(a != b for a, b in pairwise(labels))
-            if counted or len(names) >= len(labels):
-                continue
-        kind = tuple(names[label] for label in labels) if len(names) > 1 else ()
-        kinds.setdefault(kind, place)
-    return [place for kind, place in kinds.items() if kind] or [*kinds.values()]

@@ -14,7 +14,7 @@ _SHOWN = 20
 
 @dataclass(frozen=True)
 class Column:
-    """One column that is used.
+    """A column that is used.
 
     Attributes:
         quantity: one of QUANTITIES.
@@ -44,8 +44,8 @@ def named_column(
         table: whose headers are read.
         findings: of the file.
     """
-    name, unit_text = split_brackets(wanted)
-    places, option = _places(wanted, name, table), f"`columns` {quantity}="
+    name, unit_text = _split_brackets(wanted)
+    places, option = _places(wanted, name, table.headers), f"`columns` {quantity}="
     if len(places) != 1:
         words = f"{option}{wanted} names a column that is not there"
         near = get_close_matches(name, table.headers, 1, 0.4)
@@ -57,43 +57,41 @@ def named_column(
             remedy = f"Name it by its number, {numbers}"
         findings.add(words, remedy, table.header_row, name)
         return None
-    (place,) = places
-    header = table.headers[place]
+    header = table.headers[places[0]]
     if quantity in LABELS:
-        return Column(quantity, header, place)
+        return Column(quantity, header, places[0])
     parsed = parse_header(header)
     in_header = parsed.unit or find_unit(header.rpartition("_")[2])
     unit = in_header if unit_text is None else find_unit(unit_text)
     if unit is None or unit.dimension != DIMENSIONS[quantity]:
         text = parsed.unit_text if unit_text is None else unit_text
         words = f"has no unit that is known for {quantity}"
-        if text:
-            words = f"unknown unit '{text}' for {quantity}"
-        advice = unit_advice(text, quantity)
-        remedy = f"Write {option}'{name}[UNIT]'; {advice}"
+        words = f"unknown unit '{text}' for {quantity}" if text else words
+        remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
         findings.add(words, remedy, table.header_row, header)
         return None
-    against = ""
-    if in_header not in (None, unit) and in_header.dimension == unit.dimension:
-        against = in_header.name
-    return Column(quantity, header, place, unit, against=against)
+    contrary = in_header not in (None, unit) and in_header.dimension == unit.dimension
+    against = in_header.name if contrary else ""
+    return Column(quantity, header, places[0], unit, against=against)
 
 
-def _places(wanted: str, name: str, table: ReadTable) -> list[int]:
-    """Return where the columns stand that a text may name."""
+def _places(wanted: str, name: str, headers: tuple[str, ...]) -> list[int]:
+    """Return the places of the columns that a text may name."""
+
+    def called(names: set[str], texts: list[str]) -> list[int]:
+        return [i for i, text in enumerate(texts) if "".join(text.split()) in names]
+
     # A header may itself end in brackets, so the whole text is tried as well.
-    wholes = {_squeezed(wanted), _squeezed(name)}
-    headers = table.headers
-    found = [i for i, header in enumerate(headers) if _squeezed(header) in wholes]
-    if not found:
-        bare = [_squeezed(split_brackets(header)[0]) for header in headers]
-        found = [i for i, header in enumerate(bare) if header == _squeezed(name)]
-    if not found and name.isdigit() and 0 < int(name) <= len(headers):
-        found = [int(name) - 1]
-    return found
+    wholes = {"".join(text.split()) for text in (wanted, name)}
+    bare = {"".join(name.split())}
+    places = called(wholes, [*headers])
+    places = places or called(bare, [_split_brackets(header)[0] for header in headers])
+    if not places and name.isdigit() and 0 < int(name) <= len(headers):
+        return [int(name) - 1]
+    return places
 
 
-def split_brackets(text: str) -> tuple[str, str | None]:
+def _split_brackets(text: str) -> tuple[str, str | None]:
     """`Load [kgf]` -> (`Load`, `kgf`); no unit where the text ends in no brackets."""
     text = text.strip()
     name, opening, unit = text.removesuffix("]").rpartition("[")
@@ -102,18 +100,10 @@ def split_brackets(text: str) -> tuple[str, str | None]:
     return name.rstrip(), unit.strip()
 
 
-def _squeezed(text: str) -> str:
-    return "".join(text.split())
-
-
 def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
     """Return how a user would name each column: its header or number, with its unit.
 
-    Those that hdcal's own headers name need no other name.
-
-    Args:
-        table: whose columns they are.
-        used: columns by quantity.
+    Columns with hdcal's own headers need no other name.
     """
     named = {}
     for column in used.values():

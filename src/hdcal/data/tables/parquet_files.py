@@ -1,4 +1,4 @@
-"""Parquet files as one table: which ones, and of which kinds their columns are."""
+"""Parquet files as one table: their columns, and the types of these."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pyarrow import Schema
     from pyarrow.dataset import Dataset
 
-# What a Parquet file begins with.
+# First bytes of a Parquet file.
 PARQUET = b"PAR1"
 _REMEDY = "Save it anew"
 # Tables of other kinds, of which a folder is a case.
@@ -40,13 +40,13 @@ def parquet_files(path: Path) -> list[str]:
     """Return the files of a folder, those of folders in it among them."""
     if not path.is_dir():
         return [str(path)]
-    found = (one for one in path.rglob("*.parquet") if one.is_file())
-    # What engines leave beside their files begins so.
-    return sorted(str(one) for one in found if one.name[0] not in "._")
+    files = (one for one in path.rglob("*.parquet") if one.is_file())
+    # Files that engines leave beside their own begin so.
+    return sorted(str(one) for one in files if one.name[0] not in "._")
 
 
 def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "Dataset":
-    """Return files as one table; what folders are called are texts.
+    """Return files as one table; names of folders such as `lot=7` are texts.
 
     Args:
         files: some of those of a folder, or one.
@@ -70,16 +70,18 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
         "partition_base_dir": root,
     }
     try:
-        found = tables.dataset([*files], format="parquet", **split if keys else {})
-        each = [one.physical_schema for one in found.get_fragments()]
-        return found.replace_schema(_joined([*each, kinds], files, findings))
+        table = tables.dataset([*files], format="parquet", **split if keys else {})
+        schemas = [one.physical_schema for one in table.get_fragments()]
+        return table.replace_schema(_joined([*schemas, kinds], files, findings))
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of a broken file
         findings.refuse(f"is no Parquet file that can be read ({error})", _REMEDY)
 
 
-def _joined(schemas, files: Sequence[str], findings: FileFindings) -> "Schema":
+def _joined(
+    schemas: Sequence["Schema"], files: Sequence[str], findings: FileFindings
+) -> "Schema":
     """Return the columns of all files; one that has several kinds is refused."""
     import pyarrow as arrow
 
@@ -87,32 +89,26 @@ def _joined(schemas, files: Sequence[str], findings: FileFindings) -> "Schema":
     for place, schema in enumerate(schemas):
         for field in schema:
             fields.setdefault(field.name, []).append((place, field))
-    whole = []
+    joined = []
     for name, several in fields.items():
+        each = [arrow.schema([field]) for _, field in several]
         try:
-            # No file is asked for what is nothing in it, or shorter.
-            schema = arrow.unify_schemas(
-                [arrow.schema([field]) for _, field in several],
-                promote_options="permissive",
-            )
-            whole.append(schema.field(0))
+            # A column that is empty in a file, or narrower, is no other kind.
+            schema = arrow.unify_schemas(each, promote_options="permissive")
+            joined.append(schema.field(0))
         except arrow.ArrowTypeError:
-            (_, first), (at, other) = (
-                several[0],
-                next(one for one in several if one[1].type != several[0][1].type),
-            )
-            words = (
-                f"{quoted(name)} is {other.type} in {files[at]}, {first.type} before"
-            )
+            first = several[0][1].type
+            at, other = next((i, f.type) for i, f in several if f.type != first)
+            words = f"{quoted(name)} is {other} in {files[at]}, {first} before"
             if parse_header(name).quantity:
                 findings.add(words, _REMEDY)
     if findings:
         raise InputError(findings)
-    return arrow.schema(whole)
+    return arrow.schema(joined)
 
 
-def parquet_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[str]]:
-    """Return the grid of a Parquet file, and nothing that was assumed.
+def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
+    """Return the grid of a Parquet file.
 
     Raises:
         InputError: it is none, or pyarrow is missing.
@@ -122,4 +118,4 @@ def parquet_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[st
     def column(name: str) -> Any:
         return dataset.to_table(columns=[name], use_threads=False).column(0)
 
-    return arrow_grid(dataset.schema, column, dataset.count_rows(), 2), []
+    return arrow_grid(dataset.schema, column, dataset.count_rows(), 2)

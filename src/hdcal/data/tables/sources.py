@@ -23,13 +23,12 @@ _KINDS |= {PARQUET: "a Parquet file", _MATLAB: "a .mat file", _HDF5: "an HDF5 fi
 
 def is_frame(data: Any) -> bool:
     """Tell whether this is a table in memory: a data frame, or arrays by name."""
-    return isinstance(data, Mapping) or any(
-        hasattr(data, name) for name in ("to_csv", "to_pandas")
-    )
+    kinds = "to_csv", "to_pandas"
+    return isinstance(data, Mapping) or any(hasattr(data, name) for name in kinds)
 
 
 def source_name(data: Any) -> str:
-    """Return how findings call a source."""
+    """Return the name of a source in findings."""
     return NAME if is_frame(data) else str(data)
 
 
@@ -44,7 +43,7 @@ def read_source(
     Args:
         data: a path, a DataFrame, or arrays by name.
         findings: of the source.
-        encoding: of a text; by default what it looks like.
+        encoding: of a text; by default the likeliest.
         sheet: of a workbook; by default the only one with readings. With an asterisk it
             stands for several, each of them a specimen.
 
@@ -69,27 +68,22 @@ def read_source(
 
 
 def text_of(path: Path, sheet: str | None = None) -> bytes:
-    """Return the bytes of a text file as they are, of any other the table as text.
-
-    Args:
-        path: of a file that `read_source` reads.
-        sheet: of a workbook, as there.
-    """
+    """Return the bytes of a text file as they are, of any other the table as text."""
     if not _kind(path):
         return path.read_bytes()
     with FileFindings(str(path)) as findings:
         table, _ = read_source(path, findings, sheet=sheet)
     columns = [table.grid.texts(place) for place in range(len(table.headers))]
-    headers = [*table.headers] if table.named else None
-    if table.runs is not None and "run" not in table.headers:
+    headers = [*table.headers]
+    if table.runs is not None and "run" not in headers:
         columns.append([str(run + 1) for run in table.runs])
-        headers = None if headers is None else [*headers, "run"]
-    rows = [*([headers] if headers else []), *zip(*columns, strict=True)]
+        headers.append("run")
+    rows = [*([headers] if table.named else []), *zip(*columns, strict=True)]
     return "".join("\t".join(row) + "\n" for row in rows).encode()
 
 
 def _kind(path: Path) -> bytes:
-    """Return what a file begins with, if it is no text."""
+    """Return the first bytes of a file that tell its kind; none of a text."""
     with open(path, "rb") as stream:
         begins = stream.read(max(map(len, _KINDS)))
     return next((mark for mark in _KINDS if begins.startswith(mark)), b"")
@@ -101,29 +95,27 @@ def _file_table(
     """Return the table of a file, and the hash of its bytes."""
     kind = _kind(path)
     _refuse_kind(kind, findings, encoding, sheet)
-    if not kind:
-        raw = read_bytes(path, findings, wide=encoding is not None)
-        text, guessed = decode(raw, findings, encoding)
-        if not text.strip():
-            remedy = "Write a header row and at least 5 rows of readings"
-            findings.refuse("the file is empty", remedy)
-        grid, notes = text_grid(text)
-        table, notes = table_of(grid, findings), [*guessed, *notes]
-        sha256 = hashlib.sha256(raw).hexdigest()
-        return replace(table, notes=(*notes, *table.notes)), sha256
     if kind == _WORKBOOK:
         grids, notes = sheet_grids(path, findings, sheet)
-        several = sheet is not None and "*" in sheet
-        table = (
-            joined_sheets(grids, findings)
-            if several
-            else table_of(next(iter(grids.values())), findings)
-        )
+        if sheet is not None and "*" in sheet:
+            table = joined_sheets(grids, findings)
+        else:
+            table = table_of(next(iter(grids.values())), findings)
         if any(table.headers[place] for place in table.empty):
             refuse_formulas(path, findings)
     else:
-        read = parquet_grid if kind == PARQUET else mat_grid
-        grid, notes = read(path, findings)
+        if kind == PARQUET:
+            grid, notes = parquet_grid(path, findings), []
+        elif kind == _MATLAB:
+            grid, notes = mat_grid(path, findings)
+        else:
+            raw = read_bytes(path, findings, wide=encoding is not None)
+            text, guessed = decode(raw, findings, encoding)
+            if not text.strip():
+                remedy = "Write a header row and at least 5 rows of readings"
+                findings.refuse("the file is empty", remedy)
+            grid, notes = text_grid(text)
+            notes = [*guessed, *notes]
         table = table_of(grid, findings)
     with open(path, "rb") as stream:
         sha256 = hashlib.file_digest(stream, "sha256").hexdigest()

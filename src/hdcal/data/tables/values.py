@@ -19,33 +19,25 @@ from hdcal.data.tables.headers import GROUPINGS, LABELS
 from hdcal.data.tables.named_columns import Column
 from hdcal.errors import quoted
 
-# Share of cells from which on a column is no slow channel.
-_SLOW = 0.5
-_FEWEST = 5
+# Share of cells from which on a column is no slow channel, and cells that make one.
+_SLOW, _FEWEST = 0.5, 5
 
 
 def read_values(
     table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Read the used columns.
-
-    Args:
-        table: the readings.
-        used: columns by quantity.
-        findings: of the source; gets what is wrong with cells.
+    """Read the used columns; what is wrong with cells is added to the findings.
 
     Returns:
         Floats in code units (NaN where a cell is wrong) or label strings, by quantity,
-        each of shape (n,); and what was assumed of them.
+        each of shape (n,); and notes on what was assumed.
     """
     notes: list[str] = []
     values = _numbers(table, used, findings)
     for quantity, column in used.items():
-        if quantity in LABELS:
-            index, labels = read_labels(table, column, findings, notes)
-            values[quantity] = labels[index]
+        if column.unit is None:
+            values[quantity] = _labels(table, column, findings, notes)
         else:
-            assert column.unit is not None
             # A wild number may overflow here; the limits of readings report it.
             with np.errstate(over="ignore"):
                 values[quantity] = column.unit.convert(values[quantity])
@@ -69,10 +61,10 @@ def without_slow_channels(
         The rows, the columns that are used, and notes on what is left out.
     """
     kept, left, notes = np.ones(len(table.rows), bool), dict(used), []
-    numeric = [c.position for q, c in used.items() if q not in LABELS]
-    cells = table.grid.read(numeric)
-    for quantity, column in used.items():
-        if quantity in LABELS or cells[column.position].dtype != object:
+    numeric = {q: column for q, column in used.items() if q not in LABELS}
+    cells = table.grid.read(column.position for column in numeric.values())
+    for quantity, column in numeric.items():
+        if cells[column.position].dtype != object:
             continue
         filled = np.array([cell != "" for cell in cells[column.position].tolist()])
         if not len(filled) or filled.mean() > _SLOW:
@@ -91,8 +83,7 @@ def without_slow_channels(
 
 def _is_regular(filled: np.ndarray) -> bool:
     """Tell whether cells, a mask of shape (n,), are filled at about equal distances."""
-    places = np.concatenate([[-1], np.flatnonzero(filled), [len(filled)]])
-    gaps = np.diff(places)
+    gaps = np.diff(np.concatenate([[-1], np.flatnonzero(filled), [len(filled)]]))
     return bool(filled.sum() >= _FEWEST and gaps.max() <= 2 * np.median(gaps))
 
 
@@ -102,36 +93,29 @@ def _numbers(
     """Return the columns of numbers in the units of the file."""
     numeric = {name: column for name, column in used.items() if name not in LABELS}
     cells = table.grid.read(column.position for column in numeric.values())
-    odd = {p: column for p, column in cells.items() if column.dtype == object}
+    odd = {place for place, column in cells.items() if column.dtype == object}
     if odd and table.grid.has_commas():
         # One decimal mark serves all columns: some may have been read by another.
-        odd = {p: np.array(table.grid.texts(p), object) for p in cells}
-        cells = odd
-    comma = has_comma(odd.values())
-    found = {}
+        cells = {place: np.array(table.grid.texts(place), object) for place in cells}
+        odd = {*cells}
+    comma = has_comma(column for place, column in cells.items() if place in odd)
+    values = {}
     for name, column in numeric.items():
-        numbers, wrong = cells[column.position], []
+        numbers, faults = cells[column.position], []
         if column.position in odd:
-            numbers, wrong = read_numbers(numbers, comma)
+            numbers, faults = read_numbers(numbers, comma)
         # Beside decimal commas a point was refused.
-        if not comma and not wrong and may_hold_thousands(numbers):
-            wrong = thousands(table.grid.texts(column.position))
-        _add(table, wrong, column, findings)
-        found[name] = numbers
-    return found
+        if not comma and not faults and may_hold_thousands(numbers):
+            faults = thousands(table.grid.texts(column.position))
+        _add(table, faults, column, findings)
+        values[name] = numbers
+    return values
 
 
-def read_labels(
+def _labels(
     table: ReadTable, column: Column, findings: FileFindings, notes: list[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index of each row's label, and the labels, as objects.
-
-    Args:
-        table: the readings.
-        column: of the labels.
-        findings: of the source; gets rows without a label that need one.
-        notes: gets what was assumed.
-    """
+) -> np.ndarray:
+    """Return the label of each row; one in the first of many rows is repeated."""
     index, texts = table.grid.labels(column.position)
     empty = np.array([text == "" for text in texts], bool)[index]
     # As merged cells do; where most rows have a label, an empty one was forgotten.
@@ -140,13 +124,13 @@ def read_labels(
         notes.append(f"the label of {quoted(column.header)} {words} the same")
         last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(index))))
         index, empty = index[last], np.zeros(len(index), bool)
-    if column.quantity not in GROUPINGS:
+    optional = column.quantity in GROUPINGS
+    if not optional:
         words = f"the {column.quantity} label is empty"
         places = np.flatnonzero(empty).tolist()
         _add(table, [(place, words, "Name it") for place in places], column, findings)
-    stated = NOT_STATED if column.quantity in GROUPINGS else ""
-    names = [with_formula(text) or stated for text in texts]
-    return index, np.fromiter(names, object, len(names))
+    blank = NOT_STATED if optional else ""
+    return np.array([with_formula(text) or blank for text in texts], object)[index]
 
 
 def _add(

@@ -1,6 +1,7 @@
 """Grids of the sheets of a workbook (.xlsx)."""
 
 import datetime
+import io
 import zipfile
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -24,7 +25,7 @@ Rows = list[tuple[Any, ...]]
 def sheet_grids(
     path: Path, findings: FileFindings, sheet: str | None
 ) -> tuple[dict[str, ArrayGrid], list[str]]:
-    """Return the sheets that are meant, by name, and what was assumed.
+    """Return the sheets that are meant, by name, and notes on what was assumed.
 
     Args:
         path: of the workbook.
@@ -37,35 +38,31 @@ def sheet_grids(
     """
     sheets = _sheets(path, findings)
     several = sheet is not None and "*" in sheet
-    wanted = sheet or "*"
-    named = [
-        name
-        for name in sheets
-        if name == sheet or ("*" in wanted and fnmatchcase(name, wanted))
-    ]
-    if not named:
-        names = ", ".join(map(quoted, sheets))
-        findings.refuse(
-            f"has no `sheet` {quoted(sheet or '')}", f"Name one of: {names}"
-        )
     exact = sheet is not None and not several
+    # A name may hold an asterisk itself.
+    pattern = "*" if sheet is None else sheet
+    named = [n for n in sheets if n == sheet or (not exact and fnmatchcase(n, pattern))]
+
+    def names(some: list[str]) -> str:
+        return ", ".join(map(quoted, some))
+
+    if not named:
+        words = f"has no `sheet` {quoted(sheet or '')}"
+        findings.refuse(words, f"Name one of: {names([*sheets])}")
     likely = named if exact else [name for name in named if _is_table(sheets[name])]
     if not likely:
         refuse_formulas(path, findings)
-        words = f"no sheet holds a table of readings: {', '.join(map(quoted, named))}"
-        findings.refuse(
-            words, f"Write at least {_FEWEST} rows of readings below headers"
-        )
+        remedy = f"Write at least {_FEWEST} rows of readings below headers"
+        findings.refuse(f"no sheet holds a table of readings: {names(named)}", remedy)
     if len(likely) > 1 and not several:
-        names = ", ".join(map(quoted, likely))
-        findings.refuse(f"{len(likely)} sheets hold a table: {names}", _WHICH)
-    note = f"sheet {quoted(likely[0])} is meant. If not, name the sheet"
-    notes = [note] if len(sheets) > 1 and not exact else []
+        findings.refuse(f"{len(likely)} sheets hold a table: {names(likely)}", _WHICH)
+    notes = []
     if several:
-        left_out = [quoted(name) for name in named if name not in likely]
-        note = f"each sheet is a specimen: {', '.join(map(quoted, likely))}"
-        few = f"; left out, as too few readings: {', '.join(left_out)}"
-        notes = [note + few if left_out else note]
+        few = [name for name in named if name not in likely]
+        left_out = f"; left out, as too few readings: {names(few)}" if few else ""
+        notes = [f"each sheet is a specimen: {names(likely)}{left_out}"]
+    elif len(sheets) > 1 and not exact:
+        notes = [f"sheet {quoted(likely[0])} is meant. If not, name the sheet"]
     return {name: _grid(sheets[name]) for name in likely}, notes
 
 
@@ -76,12 +73,8 @@ def _grid(rows: Rows) -> ArrayGrid:
         cells[place, : len(row)] = row
     filled = cells != ""
     cells = cells[:, filled.any(axis=0)]
-    grid = ArrayGrid(
-        rows=np.arange(len(rows)) + 1,
-        width=cells.shape[1],
-        loose=[],
-        load=lambda place: cells[:, place],
-    )
+    places = np.arange(len(rows)) + 1
+    grid = ArrayGrid(places, cells.shape[1], [], lambda place: cells[:, place])
     return grid.take(filled.any(axis=1))
 
 
@@ -112,11 +105,9 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
 
 def _open(path: Path, *, values: bool) -> Any:
     """Return an open workbook, its formulas or their values."""
-    import io
-
     import openpyxl
 
-    # Given as bytes: openpyxl asks for an ending of the name else.
+    # Given as bytes, as openpyxl else requires an ending of the name.
     raw = io.BytesIO(path.read_bytes())
     return openpyxl.load_workbook(raw, read_only=True, data_only=values)
 
@@ -135,20 +126,18 @@ def refuse_formulas(path: Path, findings: FileFindings) -> None:
 
 def _cell(cell: Any) -> Any:
     """Return a cell: a number as it is stored, anything else as text."""
-    if cell is None:
-        return ""
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         return cell
     if isinstance(cell, datetime.datetime | datetime.date | datetime.time):
         return cell.isoformat()
-    return " ".join(str(cell).split())
+    return "" if cell is None else " ".join(str(cell).split())
 
 
 def _is_table(rows: Rows) -> bool:
     """Tell whether enough rows hold two numbers or more."""
-    found = 0
+    count = 0
     for row in rows:
-        found += sum(is_number(stored_text(cell)) for cell in row) >= 2
-        if found >= _FEWEST:
+        count += sum(is_number(stored_text(cell)) for cell in row) >= 2
+        if count >= _FEWEST:
             return True
     return False
