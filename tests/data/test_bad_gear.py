@@ -200,3 +200,22 @@ def test_two_thousand_unknown_keys_have_a_row_each(tmp_path):
         read_gear(path)
     found = {f.column: f.row for f in caught.value.findings}
     assert found == {f"gear.key_{i}": 5 + i for i in range(2000)}
+
+
+@pytest.mark.parametrize(
+    ("gear", "keys"),
+    [
+        ({1: 2}, ["1"]),
+        ({"priors": {3: {"family": "fixed", "value": 1.0}}}, ["priors.3"]),
+        ({"gear": {None: 1, "radius_mm": 40.0}, 2.5: 0}, ["gear.None", "2.5"]),
+    ],
+)
+def test_keys_that_are_no_text_are_refused(gear, keys):
+    with pytest.raises(InputError) as caught:
+        read_case({"deformation_mm": range(6), "force_N": range(6)}, gear=gear)
+    assert [finding.column for finding in caught.value.findings] == keys
+
+
+def test_a_column_named_by_no_text_is_refused():
+    with pytest.raises(InputError):
+        read_case({"deformation_mm": range(6), "force_N": range(6)}, columns={1: "b"})

@@ -17,7 +17,6 @@ from hdcal.data.gear_file.certificates import (
 from hdcal.data.gear_file.rig_facts import rig_fact_priors
 from hdcal.data.gear_file.schema import (
     GearFile,
-    GearTable,
     size_findings,
     tables_of,
     with_reading,
@@ -27,7 +26,6 @@ from hdcal.data.gear_file.validation import checked
 from hdcal.data.prior import Prior
 from hdcal.data.priors import (
     DYNAMIC_UNITS,
-    MATERIAL_UNITS,
     MODEL_UNITS,
     SCALE_UNITS,
     SPRING_UNITS,
@@ -35,26 +33,24 @@ from hdcal.data.priors import (
     material_names,
     material_priors,
     read_entries,
-    read_priors,
+    read_material,
     rig_priors,
 )
 from hdcal.data.records import Geometry
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings
 
 # Shipped priors of the base model that are written for a full scale.
 IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
 # The material of a spring that names none, and of any other gear that names none.
 NO_MATERIAL, _MATERIAL = "not stated", "steel"
-# What findings call a gear that no file describes.
-IN_MEMORY = "gear"
-# The name of a part of which no size is known.
-PART = "part"
+# Name in findings of a gear that no file describes.
+_IN_MEMORY = "gear"
 
 
 def unsized() -> Gear:
     """Return a part of which nothing is known: a spring of any stiffness."""
-    return read_gear({"name": PART, "theory": SPRING})
+    return read_gear({"name": "part", "theory": SPRING})
 
 
 def read_gear(
@@ -63,7 +59,7 @@ def read_gear(
     material: Path | None = None,
     reading: str | None = None,
 ) -> Gear:
-    """Read a gear file, or what would stand in one, and merge its priors.
+    """Read a gear file, or its content as a mapping, and merge its priors.
 
     Later ones win: shipped rig priors, the material's, those of certificates, those
     of the gear file. The certificate of a displacement gauge replaces no prior: it
@@ -84,7 +80,7 @@ def read_gear(
         InputError: holds everything that is wrong with the file.
     """
     if isinstance(source, Mapping):
-        path, toml = Path(IN_MEMORY), TomlFile(IN_MEMORY, tables_of(source), "")
+        path, toml = Path(_IN_MEMORY), TomlFile(_IN_MEMORY, tables_of(source))
     else:
         path, toml = Path(source), read_toml(Path(source), str(source))
     with Findings() as wrong:
@@ -98,12 +94,12 @@ def read_gear(
         facts = wrong.attempt(_material, toml, path.parent, material, chosen)
         given = wrong.attempt(_given_priors, toml, theory)
     assert isinstance(model, GearFile) and facts is not None and given is not None
-    return _assemble(model, theory, facts, given, path, toml)
+    return _assemble(model, chosen or "ring", facts, given, path, toml)
 
 
 def _assemble(
     model: GearFile,
-    theory: str | None,
+    chosen: Theory,
     facts: dict[str, Prior],
     given: dict[str, Prior],
     path: Path,
@@ -118,11 +114,18 @@ def _assemble(
         merged["deformation_offset"] = contact_as_read(contact, gauge)
     radial = 0.5 if measurement.deformation == "diametral" else 1.0
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
-    chosen: Any = theory or sizes.theory
-    theory_of_K = SPRING if chosen == SPRING else sizes.theory
+    of_file = sizes.theory if "K" in given else "ring"
+    fact = {name: float(facts[name].numbers[0]) for name in facts}
+    lengths = (
+        sizes.wall_thickness_mm,
+        sizes.radius_mm,
+        sizes.length_mm,
+        sizes.load_height_mm or sizes.length_mm,
+        fact.get("poisson"),
+    )
     return Gear(
         name=sizes.name or path.stem,
-        geometry=_geometry(sizes, facts),
+        geometry=Geometry(*(math.nan if one is None else one for one in lengths)),
         material=sizes.material or (NO_MATERIAL if chosen == SPRING else _MATERIAL),
         theory=chosen,
         reading=measurement.deformation,
@@ -130,30 +133,14 @@ def _assemble(
         force_resolution=measurement.force_resolution_N or 0.0,
         nominal_deformation=sizes.nominal_deformation_mm,
         priors={name: merged[name] for name in MODEL_UNITS},
-        K_theory=theory_of_K if "K" in given or chosen == SPRING else "ring",
+        K_theory=SPRING if chosen == SPRING else of_file,
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=rig_fact_priors(model.rig, radial) | effects,
         dynamic_priors=dynamic_priors() | moving,
-        density=_fact(facts, "density"),
+        density=fact.get("density"),
         gauge_priors={name: stated[name] for name in GAUGE_UNITS if name in stated},
     )
-
-
-def _geometry(sizes: GearTable, facts: dict[str, Prior]) -> Geometry:
-    """Return the sizes; those that a spring does not state are NaN."""
-    stated = (
-        sizes.wall_thickness_mm,
-        sizes.radius_mm,
-        sizes.length_mm,
-        sizes.load_height_mm or sizes.length_mm,
-        _fact(facts, "poisson"),
-    )
-    return Geometry(*(math.nan if size is None else size for size in stated))
-
-
-def _fact(facts: dict[str, Prior], name: str) -> float | None:
-    return float(facts[name].numbers[0]) if name in facts else None
 
 
 def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
@@ -170,16 +157,19 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
     sources = shipped | {"K": shipped["spring_stiffness"]}
 
     def scaled(table: dict[str, Prior]) -> dict[str, Prior]:
-        kept = own.keys() & table.keys()
-        kept = {name for name in kept if table[name].source == sources[name].source}
-        return {name: own[name] if name in kept else p for name, p in table.items()}
+        return {
+            name: own[name]
+            if name in own and prior.source == sources[name].source
+            else prior
+            for name, prior in table.items()
+        }
 
     priors, scales = scaled(gear.priors), scaled(gear.scale_priors)
     return replace(gear, full_scale=full_scale, priors=priors, scale_priors=scales)
 
 
 def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
-    """Return a table of the gear file; an empty one of what is none."""
+    """Return a table of the gear file; an empty one where it is none."""
     table = toml.table.get(name)
     return table if isinstance(table, dict) else {}
 
@@ -187,7 +177,7 @@ def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
 def _material(
     toml: TomlFile, folder: Path, given: Path | None, theory: str | None
 ) -> dict[str, Prior]:
-    """Priors and facts of the material, with the modulus of the theory `spring`."""
+    """Return priors and facts of the material, with the modulus of a spring."""
     if theory != SPRING:
         return _named_material(toml, folder, given)
     shipped = rig_priors()
@@ -200,7 +190,7 @@ def _material(
 def _named_material(
     toml: TomlFile, folder: Path, given: Path | None
 ) -> dict[str, Prior]:
-    """Priors and facts of the material that the gear file names, or of a given one."""
+    """Return priors and facts of the material that the file names, or a given one."""
     name = _in_table(toml, "gear").get("material", _MATERIAL)
     if not isinstance(name, str) or not 0 < len(name) <= 1000:
         return {}  # reported with the other types
@@ -214,36 +204,29 @@ def _named_material(
         known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
         remedy = f"{hint}{known}; for another one give the path of a .toml file"
         raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
-    facts = read_priors(given or folder / name, MATERIAL_UNITS, name)
-    lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
-    if lacking:
-        words = "the material says nothing of " + " and ".join(lacking)
-        remedy = 'Write a table for each, such as [poisson] family = "fixed"'
-        raise InputError([Finding(name, words, remedy)])
-    ratio = facts["poisson"]
-    if ratio.family != "fixed" or not ratio.numbers[0] < 0.5:
-        words, remedy = "is not a number below 0.5", 'Write family = "fixed"'
-        raise InputError([Finding(name, words, remedy, None, "poisson")])
-    return facts
+    return read_material(given or folder / name, name)
 
 
 def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:
-    """Priors of the table [priors]; those of effects are named `effect.parameter`."""
+    """Return the priors of the table [priors]; the theory overrides that of the file.
+
+    Those of effects are named `effect.parameter`.
+    """
     table = _in_table(toml, "priors")
     stated = _in_table(toml, "gear").get("theory") or "ring"
+    spring = (theory or stated) == SPRING
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
-    if (theory or stated) == SPRING:
-        units |= {"K": SPRING_UNITS["spring_stiffness"]}
+    units |= {"K": SPRING_UNITS["spring_stiffness"]} if spring else {}
     with Findings() as wrong:
-        if "E0" in table and (theory or stated) == SPRING:
+        if "E0" in table and spring:
             words = "has no meaning under the theory 'spring'"
             remedy = "Leave it out: K is in N/mm"
             wrong.append(toml.finding(words, remedy, "priors.E0"))
             table = {name: table[name] for name in table if name != "E0"}
-        if "K" in table and theory and (theory == SPRING) != (stated == SPRING):
+        if "K" in table and theory and spring != (stated == SPRING):
             words = f"is given under the theory '{stated}', which says nothing of "
             remedy = f"Keep the theory '{stated}'"
             wrong.append(toml.finding(f"{words}'{theory}'", remedy, "priors.K"))
-        found = wrong.attempt(read_entries, table, units, toml, "priors", effects=True)
-    assert found is not None
-    return found
+        priors = wrong.attempt(read_entries, table, units, toml, "priors", effects=True)
+    assert priors is not None
+    return priors

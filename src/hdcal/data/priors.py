@@ -14,7 +14,7 @@ from hdcal.data.resources import priors_folder
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
-# Of a radius: whatever is read.
+# Facts of the geometry, whatever the scale of the readings.
 _FACTS = ("large_deflection.curvature",)
 
 # What a prior table may hold: name -> its unit inside hdcal.
@@ -26,7 +26,7 @@ MODEL_UNITS = {
     "deformation_offset": "mm",
     "sigma": "N",
 }
-# What the theory `spring` has for K, E0 and alpha.
+# Units of K, E0 and alpha under the theory `spring`.
 SPRING_UNITS = {
     "spring_stiffness": "N/mm",
     "spring_modulus": "MPa",
@@ -78,7 +78,7 @@ def read_entries(
     Raises:
         InputError: holds everything that is wrong with the table.
     """
-    found: dict[str, Prior] = {}
+    priors: dict[str, Prior] = {}
     with Findings() as wrong:
         for name, entry in table.items():
             key = f"{prefix}.{name}" if prefix else name
@@ -95,8 +95,8 @@ def read_entries(
             for parameter, (one, place) in entries.items():
                 unit = units.get(parameter)
                 if prior := wrong.attempt(read_prior, one, place, toml, unit):
-                    found[parameter] = prior
-    return found
+                    priors[parameter] = prior
+    return priors
 
 
 def read_priors(
@@ -107,7 +107,7 @@ def read_priors(
     Args:
         source: the file.
         units: name -> code unit of every parameter it may hold.
-        file: how to name it in findings; its own name when empty.
+        file: its name in findings; that of the source when empty.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -123,49 +123,46 @@ def _shipped(name: str) -> dict[str, Prior]:
     moving = DYNAMIC_UNITS | {"mass_ratio": "1"}
     units = {"rig": MODEL_UNITS | SCALE_UNITS | SPRING_UNITS, "dynamics": moving}
     source = priors_folder() / f"{name}.toml"
+    if name == "effects":
+        toml = read_toml(source, source.name)
+        return read_entries(toml.table, {}, toml, effects=True)
     return read_priors(source, units.get(name, MATERIAL_UNITS))
 
 
-@cache
-def _shipped_effects() -> dict[str, Prior]:
-    toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
-    return read_entries(toml.table, {}, toml, effects=True)
-
-
 def rig_priors() -> dict[str, Prior]:
-    """Shipped priors of what is not the material.
+    """Return shipped priors, keys of `MODEL_UNITS`, `SCALE_UNITS` and `SPRING_UNITS`.
 
-    Keys of `MODEL_UNITS`, `SCALE_UNITS` and `SPRING_UNITS`.
+    E0 and alpha are those of the material.
     """
     return _shipped("rig").copy()
 
 
 def dynamic_priors() -> dict[str, Prior]:
-    """Shipped priors of the moving gear: `DYNAMIC_UNITS`, mass as `mass_ratio`."""
+    """Return shipped priors: `DYNAMIC_UNITS`, the mass as `mass_ratio`."""
     return _shipped("dynamics").copy()
 
 
 def effect_priors(full_scale: FullScale = REFERENCE) -> dict[str, Prior]:
-    """Shipped priors of the effects' parameters, keyed `effect.parameter`.
+    """Return shipped priors of the effects' parameters, keyed `effect.parameter`.
 
     Args:
         full_scale: of the rig on which the effects act.
     """
     return {
         name: prior if name in _FACTS else full_scale.own(prior)
-        for name, prior in _shipped_effects().items()
+        for name, prior in _shipped("effects").items()
     }
 
 
 def material_names() -> list[str]:
-    """Materials that hdcal ships, in alphabetical order."""
+    """Return the materials that hdcal ships, in alphabetical order."""
     files = (item.name for item in priors_folder().iterdir())
     stems = (name.removesuffix(".toml") for name in files if name.endswith(".toml"))
     return sorted(stem for stem in stems if stem not in _NO_MATERIALS)
 
 
 def material_priors(name: str) -> dict[str, Prior]:
-    """Priors and facts of a shipped material, keyed as `MATERIAL_UNITS`.
+    """Return priors and facts of a shipped material, keyed as `MATERIAL_UNITS`.
 
     Raises:
         InputError: no such material.
@@ -174,3 +171,22 @@ def material_priors(name: str) -> dict[str, Prior]:
         remedy = did_you_mean(name, material_names())
         raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
     return _shipped(name).copy()
+
+
+def read_material(source: Path, file: str) -> dict[str, Prior]:
+    """Read the file of a material, keyed as `MATERIAL_UNITS`.
+
+    Raises:
+        InputError: holds everything that is wrong with it, also what it lacks.
+    """
+    facts = read_priors(source, MATERIAL_UNITS, file)
+    lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
+    if lacking:
+        words = "the material says nothing of " + " and ".join(lacking)
+        remedy = 'Write a table for each, such as [poisson] family = "fixed"'
+        raise InputError([Finding(file, words, remedy)])
+    ratio = facts["poisson"]
+    if ratio.family != "fixed" or not ratio.numbers[0] < 0.5:
+        words, remedy = "is not a number below 0.5", 'Write family = "fixed"'
+        raise InputError([Finding(file, words, remedy, None, "poisson")])
+    return facts

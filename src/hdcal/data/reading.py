@@ -48,7 +48,7 @@ def read_case(
         data: a CSV file or a workbook (.xlsx), or a folder holding data.csv and
             gear.toml; or a DataFrame, or arrays by name, under the headers of such
             files.
-        gear: a gear file, or what would stand in one as a mapping, as in
+        gear: a gear file, or its content as a mapping, as in
             `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
             default the gear.toml beside the data, and where there is none a spring of
             which only the stiffness is asked.
@@ -57,13 +57,13 @@ def read_case(
             the gear file's table [columns].
         theory: overrides the gear file's theory.
         material: stands for the material file that the gear names.
-        encoding: of the CSV file; by default what it looks like.
+        encoding: of the CSV file; by default the likeliest.
         sheet: of a workbook (.xlsx); by default the one with readings. With an
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
         reading: of the deformation, `radial` or `diametral`, where the gear file is
             silent; by default it is taken for radial, and a note says so.
         specimen: label of the one whose rows are wanted; by default all of them.
-        skip_bad: leave out specimens of which a row is wrong, whole; `left_out` of the
+        skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
         range: working range, outside of which rows are left out: `0.1:0.6` of the
             deformation as read [mm], `10%:40%` of the largest force of each run, or
@@ -86,10 +86,10 @@ def read_case(
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
         asked = (theory, material, reading)
-        found = of_gear.attempt(gear_of, gear, nearby, folder, asked)
-        stated = found[0].source.get("columns", {}) if found is not None else {}
-        how: dict = {"gear": found and found[0], "skip_bad": skip_bad}
-        named = stated | columns
+        described = of_gear.attempt(gear_of, gear, nearby, folder, asked)
+        known = None if described is None else described[0]
+        named = columns if known is None else known.source.get("columns", {}) | columns
+        how: dict = {"gear": known, "skip_bad": skip_bad}
         measured = wrong.attempt(
             read_measurements, table, named, encoding, sheet, **how
         )
@@ -97,10 +97,10 @@ def read_case(
         alone = own != path and measured is not None and len(measured.gears[1]) == 1
         if measured is not None and specimen is not None and not alone:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
-    assert measured is not None and found is not None
+    assert measured is not None and described is not None
     label = None if own != path else specimen
     name = _name(own, folder, sheet, label)
-    return case_of(measured, *found, name, range, skip_bad)
+    return case_of(measured, *described, name, range, skip_bad)
 
 
 def asked_columns(
@@ -113,12 +113,12 @@ def asked_columns(
     if not is_frame(data) and not isinstance(data, str | os.PathLike):
         remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
         raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
-    named = {name: str(header) for name, header in (columns or {}).items()}
+    named = {str(name): str(header) for name, header in (columns or {}).items()}
     return named, is_frame(data)
 
 
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
-    """Return what the case, or its folder, is called: after file and parts named."""
+    """Return the name of the case, or of its folder, after file and parts."""
     name = (data.resolve().name if folder else data.stem) or "case"
     texts = (str(part).replace("*", "").strip() for part in parts if part is not None)
     return "-".join([name, *(_NO_NAME.sub("_", text) for text in texts)])
@@ -130,12 +130,12 @@ def gear_of(
     folder: bool,
     asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
-    """Return the gear of a case, and notes on where it comes from.
+    """Return the gear of a case, and notes on its source.
 
     Args:
         gear: that was named, as in `read_case`.
-        nearby: where a gear file may lie; None of a table in memory.
-        folder: whether one has to lie there.
+        nearby: place of a gear file that may be there; None of a table in memory.
+        folder: whether one has to be there.
         asked: theory, material and reading, as in `read_case`.
     """
     theory, material, reading = asked
@@ -144,8 +144,8 @@ def gear_of(
         gear = nearby
         notes += [] if folder else [_NEARBY]
     if gear is not None:
-        found = read_gear(gear, *asked)
-        return found, (*_defaults(found), *notes)
+        known = read_gear(gear, *asked)
+        return known, (*_defaults(known), *notes)
     if theory not in (None, SPRING) or material is not None or reading is not None:
         words = "no gear file says the sizes that this needs"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
@@ -159,7 +159,7 @@ def leaves_reading_open(gear: Gear) -> bool:
 
 
 def _defaults(gear: Gear) -> Iterator[str]:
-    """Yield what the gear file leaves to a default that much depends on."""
+    """Yield defaults that the gear file leaves and on which much depends."""
     if leaves_reading_open(gear):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "

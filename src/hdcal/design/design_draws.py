@@ -20,7 +20,7 @@ from hdcal.data.priors import (
 )
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.design.materials import read_material
+from hdcal.design.materials import material_of
 from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import frozen, sample_prior
 from hdcal.inference.problem import Problem
@@ -158,7 +158,7 @@ class DesignDraws:
         """
         if name == self.material:
             return self
-        facts = read_material(name)
+        facts = material_of(name)
         # Independent of the draws of the gear as it is.
         rng = np.random.default_rng([seed, 1])
         new = {

@@ -27,7 +27,7 @@ CLASS_K = 2.0
 GAINS = ("force_gain", "deformation_gain")
 ZEROS = ("force_offset", "deformation_offset")
 GAUGE_UNITS = {**dict.fromkeys(GAINS, "1"), "temperature_offset": "K"}
-_ZERO_UNITS = {"force_offset": "N", "deformation_offset": "mm"}
+_UNITS = GAUGE_UNITS | {"force_offset": "N", "deformation_offset": "mm"}
 _SOURCE = "certificate: "
 
 _Percent = Annotated[float, within("expanded_percent")]
@@ -104,23 +104,17 @@ def is_stated(prior: Prior) -> bool:
 
 
 def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior]:
-    """Return the priors that certificates state, by site, in code units.
-
-    Args:
-        given: by their keys in [measurement].
-    """
-    found = {}
+    """Return the priors that certificates state, by site, in code units."""
+    priors = {}
     for one in given.values():
         for key, value in one.stated.items():
-            of_class, site = key in CLASSES, one.SITES[key]
-            expanded = CLASSES[key][value] if of_class else value
-            k = CLASS_K if of_class else one.k or CLASS_K
-            gain = of_class or key == "expanded_percent"
-            sd = expanded / k * (0.01 if gain else 1.0)
+            expanded, k, unit = value, one.k or CLASS_K, _UNITS[one.SITES[key]]
+            if key in CLASSES:
+                expanded, k = CLASSES[key][value], CLASS_K
+            sd = expanded / k * (0.01 if unit == "1" else 1.0)
             source = f"{_SOURCE}{key} = {value}, k = {k:g}"
-            unit = (GAUGE_UNITS | _ZERO_UNITS)[site]
-            found[site] = Prior("normal", (0.0, sd), unit, source)
-    return found
+            priors[one.SITES[key]] = Prior("normal", (0.0, sd), unit, source)
+    return priors
 
 
 def contact_as_read(contact: Prior, gauge: Prior) -> Prior:

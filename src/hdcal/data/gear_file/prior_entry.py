@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, Field, TypeAdapter, ValidationInfo
+from pydantic import AfterValidator, BaseModel, ValidationInfo, create_model
 
 from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.gear_file.validation import STRICT, checked, fault
@@ -18,7 +18,7 @@ _UNIT_NEEDED = {"E0": "GPa", "alpha": "1e-4/K", "mass": "kg"}
 
 
 def _known_unit(text: str, info: ValidationInfo) -> str:
-    """Return a unit if it measures what the context of the validation says."""
+    """Return a unit if it converts to the one in the context of the validation."""
     wanted = info.context
     try:
         _, name = to_code(text)
@@ -43,11 +43,14 @@ def _above_low(number: float, info: ValidationInfo) -> float:
     return number
 
 
-_Size = Annotated[float, AfterValidator(_positive)]
+class _Unknown(BaseModel):
+    """An entry of a family that does not exist."""
+
+    family: Literal["fixed", "normal", "lognormal", "half_normal", "uniform", "beta"]
 
 
 class _Entry(BaseModel):
-    """What an entry of any family may hold."""
+    """Part of an entry of any family."""
 
     model_config = STRICT
     unit: Annotated[str, AfterValidator(_known_unit)] | None = None
@@ -55,54 +58,25 @@ class _Entry(BaseModel):
     note: Any = None
 
 
-class _Fixed(_Entry):
-    family: Literal["fixed"]
-    value: float
-
-
-class _Normal(_Entry):
-    family: Literal["normal"]
-    mean: float
-    sd: _Size
-
-
-class _LogNormal(_Entry):
-    family: Literal["lognormal"]
-    median: _Size
-    log_sd: _Size
-
-
-class _HalfNormal(_Entry):
-    family: Literal["half_normal"]
-    sd: _Size
-
-
-class _Uniform(_Entry):
-    family: Literal["uniform"]
-    low: float
-    high: Annotated[float, AfterValidator(_above_low)]
-
-
-class _Beta(_Entry):
-    family: Literal["beta"]
-    a: _Size
-    b: _Size
-
-
-_FAMILIES: dict[str, type[_Entry]] = {
-    "fixed": _Fixed,
-    "normal": _Normal,
-    "lognormal": _LogNormal,
-    "half_normal": _HalfNormal,
-    "uniform": _Uniform,
-    "beta": _Beta,
+# Types of the numbers that are not any float.
+_NUMBERS: dict[str, Any] = {
+    **dict.fromkeys(
+        ("sd", "median", "log_sd", "a", "b"),
+        Annotated[float, AfterValidator(_positive)],
+    ),
+    "high": Annotated[float, AfterValidator(_above_low)],
 }
-_ENTRY: TypeAdapter[_Entry] = TypeAdapter(
-    Annotated[
-        _Fixed | _Normal | _LogNormal | _HalfNormal | _Uniform | _Beta,
-        Field(discriminator="family"),
-    ]
-)
+
+
+def _entry_of(family: str) -> type[_Entry]:
+    """Return the model of the entries of a family."""
+    fields: dict[str, Any] = {
+        n: (_NUMBERS.get(n, float), ...) for n in FAMILIES[family]
+    }
+    return create_model(family, __base__=_Entry, family=(str, ...), **fields)
+
+
+_ENTRIES = {family: _entry_of(family) for family in FAMILIES}
 
 
 def read_prior(
@@ -126,7 +100,8 @@ def read_prior(
         example = f'{{ family = "normal", mean = 0.0, sd = 1.0, unit = "{unit or 1}" }}'
         words = "is not a table with a family and its numbers"
         raise toml.error(words, f"Write {example}", key)
-    table: Any = checked(_ENTRY, entry, toml, key, unit, _FAMILIES)
+    kind = _ENTRIES.get(str(entry.get("family")), _Unknown)
+    table: Any = checked(kind, entry, toml, key, unit)
     family, name = table.family, key.rpartition(".")[2]
     if table.unit is None and unit is not None and name in _UNIT_NEEDED:
         remedy = f'Write unit = "{_UNIT_NEEDED[name]}"'
@@ -146,16 +121,16 @@ def read_prior(
 
 
 def _check_numbers(prior: Prior, quantity: str, key: str, toml: TomlFile) -> None:
-    """Refuse numbers that no gear and no rig can have."""
+    """Refuse numbers in code units that no gear and no rig can have."""
     known = range_of(quantity)
     spread = known._replace(low=0.0, high=max(-known.low, known.high))
     ranges = {"log_sd": RANGES["log_sd"], "a": RANGES["beta"], "b": RANGES["beta"]}
     ranges |= {"sd": spread, "low": known._replace(low=min(known.low, 0.0))}
     with Findings() as wrong:
         for name, number in zip(FAMILIES[prior.family], prior.numbers, strict=True):
-            for found in out_of_range(name, float(number), ranges.get(name, known)):
+            for finding in out_of_range(name, float(number), ranges.get(name, known)):
                 place = f"{key}.{name}"
-                wrong.append(toml.finding(found.problem, found.remedy, place))
+                wrong.append(toml.finding(finding.problem, finding.remedy, place))
         if quantity == "noise_correlation" and not wrong:
             bounded = prior.family in ("beta", "uniform", "fixed")
             if not bounded or (prior.family, *prior.numbers) == ("fixed", 1.0):

@@ -42,22 +42,24 @@ def rig_fact_priors(facts: RigTable, radial_per_read: float) -> dict[str, Prior]
         facts: of the rig, its deformations as read.
         radial_per_read: radial deformation per deformation as read.
     """
-    found, shipped = {}, effect_priors()
+    priors, shipped = {}, effect_priors()
+
+    def at_scale(name: str, scale: FullScale, source: str) -> None:
+        priors[name] = replace(scale.own(shipped[name]), source=f"[rig] {source}")
+
     if capacity := facts.load_cell_capacity_N:
-        name = "force_saturation.curvature"
-        prior = FullScale(capacity, REFERENCE.deformation).own(shipped[name])
-        source = "[rig] load_cell_capacity_N: the shipped share, lost at capacity"
-        found[name] = replace(prior, source=source)
+        scale = FullScale(capacity, REFERENCE.deformation)
+        source = "load_cell_capacity_N: the shipped share, lost at capacity"
+        at_scale("force_saturation.curvature", scale, source)
     if reach := facts.gauge_range_mm:
-        name = "displacement_nonlinearity.curvature"
-        prior = FullScale(REFERENCE.force, reach * radial_per_read).own(shipped[name])
-        source = "[rig] gauge_range_mm: the shipped linearity error, of the range"
-        found[name] = replace(prior, source=source)
+        scale = FullScale(REFERENCE.force, reach * radial_per_read)
+        source = "gauge_range_mm: the shipped linearity error, of the range"
+        at_scale("displacement_nonlinearity.curvature", scale, source)
     if pitch := facts.displacement_pitch_mm:
         numbers = (pitch * radial_per_read, _PITCH_LOG_SD)
         source = "[rig] displacement_pitch_mm"
-        found["screw_error.pitch"] = Prior("lognormal", numbers, "mm", source)
-    return found
+        priors["screw_error.pitch"] = Prior("lognormal", numbers, "mm", source)
+    return priors
 
 
 def correlation_prior(
@@ -69,7 +71,7 @@ def correlation_prior(
     """Return the prior of the correlation of neighbouring readings.
 
     White noise behind a filter of first order is correlated by e^(−2π f Δt). Where
-    that is little nothing is known: what else there is may err alike for longer.
+    that is little nothing is known: other causes may correlate errors for longer.
 
     Args:
         cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
@@ -77,8 +79,8 @@ def correlation_prior(
         run: index of the mounting, shape (n,).
         time: of the readings [s], shape (n,); None where it was not measured.
     """
-    if cutoff is not None and time is not None and np.any(np.diff(time) > 0.0):
-        steps = np.diff(time)
+    steps = np.diff(time) if cutoff is not None and time is not None else np.array([])
+    if cutoff is not None and np.any(steps > 0.0):
         typical = float(np.median(steps[steps > 0.0]))
         likely = math.exp(-2.0 * math.pi * cutoff * typical)
         (a, b), known = _UNFILTERED, _AS_GOOD_AS * likely

@@ -18,11 +18,11 @@ from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.gear_file.validation import STRICT, fault, within
 from hdcal.data.plausible import range_of
 from hdcal.data.theory_names import READINGS, SPRING, Theory
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.screening.working_range import FORM, read_range
 
 _Size = Annotated[float, within("size")]
-# What no theory but `SPRING` can do without.
+# Sizes that every theory but `SPRING` needs.
 SIZES_NEEDED = ("wall_thickness_mm", "radius_mm", "length_mm")
 
 
@@ -77,23 +77,44 @@ class GearFile(BaseModel):
     priors: dict[str, Any] = {}
 
 
-def tables_of(source: Mapping[str, Any]) -> dict[str, Any]:
+def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the tables of a gear file from a mapping that may leave out their names.
 
     A key that no table has is put into [gear], where the schema refuses it.
+
+    Raises:
+        InputError: a key is no text, or is stated twice.
     """
-    found: dict[str, Any] = {"gear": {}}
-    found |= {key: source[key] for key in source if key in GearFile.model_fields}
-    for key in (key for key in source if key not in GearFile.model_fields):
+    plain = _with_text_keys(source)
+    tables: dict[str, Any] = {"gear": {}}
+    tables |= {key: plain[key] for key in plain if key in GearFile.model_fields}
+    for key in (key for key in plain if key not in GearFile.model_fields):
         name = "measurement" if key in MeasurementTable.model_fields else "gear"
-        table = found.get(name, {})
-        if not isinstance(table, Mapping):
+        table = tables.get(name, {})
+        if not isinstance(table, dict):
             continue  # refused by the schema
         if key in table:
             words = f"is stated twice, alone and in the table [{name}]"
             raise InputError([Finding(key, words, "State it once")])
-        found[name] = {**table, key: source[key]}
-    return found
+        tables[name] = {**table, key: plain[key]}
+    return tables
+
+
+def _with_text_keys(source: Mapping[Any, Any], above: str = "") -> dict[str, Any]:
+    """Return a mapping and those in it as dictionaries, if all keys are texts."""
+    plain = {}
+    with Findings() as wrong:
+        for key, value in source.items():
+            place = f"{above}{key}"
+            if not isinstance(key, str):
+                words = "the key is no text"
+                remedy = "Write names of tables and their entries as texts"
+                wrong.append(Finding("gear", words, remedy, None, place))
+            elif isinstance(value, Mapping):
+                plain[key] = wrong.attempt(_with_text_keys, value, f"{place}.")
+            else:
+                plain[key] = value
+    return plain
 
 
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
@@ -102,7 +123,7 @@ def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
 
 
 def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
-    """Sizes that are missing, and relations between those that are there.
+    """Return sizes that are missing, and relations between those that are there.
 
     Checked whatever else is wrong.
 
@@ -119,17 +140,18 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
         other = f"; or keep the theory '{SPRING}' of the file, which needs none"
     elif missing == [*SIZES_NEEDED]:
         other = f"; or take the theory '{SPRING}', which needs none"
-    needed = (theory or table.get("theory")) != SPRING
-    lacking = [
+    if (theory or table.get("theory")) == SPRING:
+        missing = []
+    findings = [
         toml.finding("is missing", f"Add it: {name} = …{other}", f"gear.{name}")
-        for name in (missing if needed else ())
+        for name in missing
     ]
     numbers = {
         name.removesuffix("_mm"): value
         for name, value in table.items()
         if type(value) in (int, float) and range_of("size").holds(value)
     }
-    return lacking + [
+    return findings + [
         toml.finding(words, remedy, f"gear.{name}_mm")
         for name, words, remedy in size_faults(numbers)
     ]

@@ -1,4 +1,4 @@
-"""A TOML file that still knows on which line each key stands."""
+"""A TOML file with the line of each key."""
 
 import re
 import tomllib
@@ -12,8 +12,7 @@ from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 
 LARGEST = 1 << 20
-
-# of lines without blanks around them
+# Lines without blanks around them.
 _TABLE = re.compile(r"\[\[?(?P<name>[^\[\]]+)\]\]?\s*(#.*)?")
 _KEY = re.compile(r"[\w\"'-]+")
 _PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
@@ -24,31 +23,29 @@ class TomlFile:
     """A parsed TOML file.
 
     Attributes:
-        file: how the user named it.
+        file: its name, as the user gave it.
         table: its content.
         text: as it stands in the file.
     """
 
     file: str
     table: dict
-    text: str
+    text: str = ""
 
     def finding(self, problem: str, remedy: str, key: str) -> Finding:
-        """A finding about a dotted key, with its line where that is found."""
-        return Finding(self.file, problem, remedy, self.row(key), key)
+        """Return a finding on a dotted key, with its line where that is known."""
+        row = key
+        while row and row not in self._rows:
+            row = row.rpartition(".")[0]
+        return Finding(self.file, problem, remedy, self._rows.get(row), key)
 
     def error(self, problem: str, remedy: str, key: str) -> InputError:
-        """An error of that one finding."""
+        """Return an error of that one finding."""
         return InputError([self.finding(problem, remedy, key)])
-
-    def row(self, key: str) -> int | None:
-        """Line of a dotted key, or of the innermost table around it."""
-        while key and key not in self._rows:
-            key = key.rpartition(".")[0]
-        return self._rows.get(key)
 
     @cached_property
     def _rows(self) -> dict[str, int]:
+        """Line of each dotted key and table."""
         rows: dict[str, int] = {}
         table = ""
         for number, line in enumerate(map(str.strip, self.text.splitlines()), 1):
@@ -69,7 +66,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
 
     Args:
         source: a path, or a file shipped with hdcal.
-        file: how the user named it.
+        file: its name in findings.
 
     Raises:
         InputError: missing, unreadable, too large, or not TOML.
@@ -94,16 +91,17 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         raise refusal("is not UTF-8 text", "Save it as UTF-8", row) from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         # RecursionError: thousands of nested brackets
-        message = "nested too deeply" if isinstance(error, RecursionError) else error
-        place = _PLACE.search(str(message))
-        words = f"is not TOML: {_PLACE.sub('', str(message))[:200]}"
+        nested = isinstance(error, RecursionError)
+        message = "nested too deeply" if nested else str(error)
+        place = _PLACE.search(message)
+        words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
         raise refusal(words, "Correct that line", row) from None
     return TomlFile(file, table, text)
 
 
 def did_you_mean(name: str, known: list[str], what: str = "Known are") -> str:
-    """A remedy that names the likeliest meaning of an unknown name, and the rest."""
+    """Return a remedy with the likeliest meaning of an unknown name, and all known."""
     by_lower = {item.lower(): item for item in known}
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
     hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,18 +25,12 @@ from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
 
-# What may differ between the files of gears of one kind, as dotted keys begin.
+# First parts of the dotted keys that may differ between the files of gears of one kind.
 _OWN = ("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm")
 _OWN += ("gear.load_height_mm", "gear.name", "gear.nominal_deformation_mm", "columns.")
 _SIZES = ("wall_thickness", "radius", "length", "load_height")
-
-
-@dataclass(frozen=True)
-class _Part:
-    """What one file holds."""
-
-    measured: Measurements
-    gear: Gear | None
+# What one file holds, its specimens named, and its gear; None where it has none.
+_Part = tuple[Measurements, Gear | None]
 
 
 def read_gear_folder(
@@ -53,18 +47,18 @@ def read_gear_folder(
     """Read a folder with a file for each gear, or with a folder for each.
 
     Where a file names no gears, all of its rows are of the one that it, or its folder,
-    is called after.
+    is called after. A file that cannot be read is a bad gear.
 
     Args:
-        data: a folder of which `gear_files` knows.
+        data: a folder for which `gear_files` returns some.
         gear: as in `read_case`; by default the gear.toml in the folder, or that of the
             first gear. Others may differ from it in their sizes.
-        columns: as in `read_case`.
-        theory: likewise.
-        reading: likewise.
-        range: likewise.
-        encoding: likewise.
-        skip_bad: likewise. A file that cannot be read is a gear that is bad.
+        columns: as in `read_case`, and so are all that follow.
+        theory: overrides the gear file's.
+        reading: of the deformation.
+        encoding: of the files.
+        skip_bad: whether bad gears are left out.
+        range: working range.
 
     Raises:
         InputError: holds everything that is wrong with any file.
@@ -83,35 +77,37 @@ def read_gear_folder(
     base = str(nearby) if gear is None else "`gear`"
     base = str(gear) if isinstance(gear, str | Path) else base
     with Findings() as wrong:
-        found, notes = wrong.attempt(gear_of, gear, nearby, False, asked) or (None, ())
-        parts, unread = [], {}
+        common, notes = wrong.attempt(gear_of, gear, nearby, False, asked) or (None, ())
+        parts: list[_Part] = []
+        unread: dict[str, Findings] = {}
         for place, (file, label) in enumerate(zip(files, labels, strict=True)):
             each, its = Findings(), None
             if own:
                 its = each.attempt(read_gear, own[place], *asked)
-            if its is not None and found is not None:
-                each += _differences(its, found, own[place], base)
-            here = its or found
+            if its is not None and common is not None:
+                each += _differences(its, common, own[place], base)
+            here = its or common
             mine = named if here is None else here.source.get("columns", {}) | named
             how: dict = {"gear": here, "skip_bad": skip_bad or None}
             measured = each.attempt(read_measurements, file, mine, encoding, **how)
             if measured is not None and parts:
-                each += _other_kind(measured, parts[0].measured)
+                each += _other_kind(measured, parts[0][0])
             if each:
                 unread[label] = each
             elif measured is not None:
-                parts.append(_Part(_labelled(measured, label), its))
+                parts.append((_labelled(measured, label), its))
         wrong += _unread(parts, unread, skip_bad=skip_bad)
-    assert found is not None
+    assert common is not None
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
-    whole = joined([part.measured for part in parts], found.reference_temperature, bad)
+    whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
     about = [f"each {kind} is a gear, called after it, unless it names gears itself"]
     compared = f"the gear file, with sizes at which gears are compared, is {base}"
-    about += [*([compared] if own else []), *not_read(files, folder), *_open(parts)]
+    about += [*([compared] if own else []), *not_read(files, folder)]
+    about += _stated_by_some([part.stated for part, _ in parts])
     name = folder.resolve().name
-    case = case_of(whole, found, (*about, *notes), name, range, skip_bad)
-    return case, _sizes(parts) if own and found.theory != SPRING else None
+    case = case_of(whole, common, (*about, *notes), name, range, skip_bad)
+    return case, _sizes(parts) if own and common.theory != SPRING else None
 
 
 def _labelled(measured: Measurements, label: str) -> Measurements:
@@ -150,15 +146,13 @@ def joined(
     whole: Any = pd.concat([frame.astype(labels) for frame in frames])
     left_out = {gear: why for part in parts for gear, why in part.left_out.items()}
     hashes = "".join(part.sha256 for part in parts)
-    return Measurements(
-        whole.astype(dict.fromkeys(labels, "category")),
-        parts[0].file,
-        hashlib.sha256(hashes.encode()).hexdigest(),
-        frozenset().union(*(part.stated for part in parts)),
+    return replace(
+        parts[0],
+        frame=whole.astype(dict.fromkeys(labels, "category")),
+        sha256=hashlib.sha256(hashes.encode()).hexdigest(),
+        stated=frozenset().union(*(part.stated for part in parts)),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
-        named=parts[0].named,
         left_out={**bad, **left_out},
-        units=parts[0].units,
     )
 
 
@@ -172,29 +166,29 @@ def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
 def _unread(
     parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool | None
 ) -> list[Finding]:
-    """Return what stops all: files that cannot be read, unless they may be left out.
+    """Return findings on files that cannot be read, unless they may be left out.
 
     Where others name gears themselves nobody knows which gears such a file holds.
     """
-    known = not any("specimen" in part.measured.stated for part in parts)
-    if skip_bad and known and parts:
+    known = bool(parts) and not any("specimen" in part.stated for part, _ in parts)
+    if skip_bad and known:
         return []
-    found = [finding for each in unread.values() for finding in each]
-    if unread and known and parts and skip_bad is False:
+    findings = [finding for each in unread.values() for finding in each]
+    if unread and known and skip_bad is False:
         bad = {label: each[0] for label, each in unread.items()}
-        found.append(offer(bad, len(parts) + len(bad)))
-    return found
+        findings.append(offer(bad, len(parts) + len(bad)))
+    return findings
 
 
 def _why(first: Finding, folder: Path) -> Finding:
-    """Return why a gear is left out; where no row says in which file, the words do."""
+    """Return why a gear is left out, with the file in the words where no row is."""
     if first.row is not None:
         return first
     return Finding(str(folder), f"{first.where}: {first.problem}", first.remedy)
 
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
-    """Yield what a gear file says otherwise than that of all gears, but sizes."""
+    """Yield differences of a gear file from that of all gears, but for sizes."""
     mine, theirs = (dict(_flat(each.source)) for each in (one, other))
     remedy = "Gears of one kind differ in their sizes only"
     keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
@@ -212,6 +206,7 @@ def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Find
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the entries of nested tables by their dotted keys."""
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{above}{key}.")
@@ -222,19 +217,18 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:
     """Return the sizes of each gear as a table; one of two sizes stands there twice."""
     rows = dict.fromkeys(
-        (gear, *(float(getattr(part.gear.geometry, name)) for name in _SIZES))
-        for part in parts
-        if part.gear is not None
-        for gear in part.measured.gears[1]
+        (label, *(float(getattr(gear.geometry, name)) for name in _SIZES))
+        for part, gear in parts
+        if gear is not None
+        for label in part.gears[1]
     )
     names = ["specimen", *(f"{name}_mm" for name in _SIZES)]
     return pd.DataFrame([*rows], columns=names).to_dict("list")
 
 
-def _open(parts: Sequence[_Part]) -> Iterator[str]:
-    """Yield a note on what some files state and others do not."""
-    known = {"specimen", "temperature", "run", *GROUPINGS}
-    each = [part.measured.stated - known for part in parts]
+def _stated_by_some(stated: Sequence[frozenset[str]]) -> Iterator[str]:
+    """Yield a note on each quantity that some files state and others do not."""
+    each = [one - {"specimen", "temperature", "run", *GROUPINGS} for one in stated]
     for name in sorted(frozenset().union(*each) - each[0].intersection(*each)):
-        many = sum(name in stated for stated in each)
+        many = sum(name in one for one in each)
         yield f"{name} is not read: {many} of {len(each)} files state it"

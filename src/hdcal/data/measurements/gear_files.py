@@ -1,4 +1,4 @@
-"""Files of a folder that hold a gear each, and what each gear is called."""
+"""Files of a folder that hold a gear each, and the name of each gear."""
 
 import os
 from collections import Counter
@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.errors import Finding, InputError, listed, quoted
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 # Tables of readings by their names. A text may be a remark: it counts as one only where
 # nothing else does.
 _TABLES = (".csv", ".tsv", ".dat", ".asc", ".lvm", ".xlsx", ".mat", ".parquet")
 _TEXT = ".txt"
-_FIRST_FEW = 3
+_LISTED = 3
 
 
 def gear_files(data: Any) -> list[Path]:
@@ -31,10 +31,10 @@ def gear_files(data: Any) -> list[Path]:
 
 
 def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
-    """Return what each gear is called, and whether each has a folder of its own.
+    """Return the names of the gears, and whether each has a folder of its own.
 
     Raises:
-        InputError: some have one and some not, or two are called alike.
+        InputError: some have one and some not, or two have the same name.
     """
     cases = [file for file in files if file.parent != folder]
     if cases and len(cases) < len(files):
@@ -52,14 +52,10 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
 
 
 def file_of_gear(data: Path, label: str | None) -> Path:
-    """Return where one gear lies, of a folder that has a file for each; else the data.
-
-    Args:
-        data: a file or a folder.
-        label: of the gear.
+    """Return the file of a gear in a folder that has one for each; else the data.
 
     Raises:
-        InputError: it is such a folder, and no gear of it is called so.
+        InputError: it is such a folder, and none of its gears is called so.
     """
     files = gear_files(data)
     if not files:
@@ -76,12 +72,10 @@ def file_of_gear(data: Path, label: str | None) -> Path:
 
 
 def not_read(files: Sequence[Path], folder: Path) -> Iterator[str]:
-    """Yield a note on what else the folder holds."""
+    """Yield a note on the other content of the folder."""
     known = {GEAR_NAME, *(file.relative_to(folder).parts[0] for file in files)}
     inside = sorted(one.name for one in folder.iterdir())
     others = [one for one in inside if one not in known and not one.startswith(".")]
     if others:
-        more = len(others) - _FIRST_FEW
-        named = ", ".join(others[:_FIRST_FEW])
-        named += f" and {more} more" if more > 0 else ""
-        yield f"not read, as it is no table and no folder with a {DATA_NAME}: {named}"
+        names = listed(others, _LISTED)
+        yield f"not read, as it is no table and no folder with a {DATA_NAME}: {names}"

@@ -40,7 +40,7 @@ class Parquet:
 
     Attributes:
         name: of the file, or of the folder.
-        gear: what is known of all gears.
+        gear: common to all gears.
         files: in their order.
         root: of their folder; empty where there is one file.
         schema: of all files.
@@ -86,10 +86,10 @@ def open_parquet(
         data: the file, or the folder.
         gear: as in `read_case`; by default the gear.toml beside the file, or in the
             folder.
-        columns: as in `read_case`.
-        theory: likewise.
-        reading: likewise.
-        range: likewise.
+        columns: as in `read_case`, and so are all that follow.
+        theory: overrides the gear file's.
+        reading: of the deformation.
+        range: working range.
 
     Raises:
         InputError: holds everything that is wrong with its columns.
@@ -101,8 +101,8 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        found, notes = gear_of(gear, nearby, False, (theory, None, reading))
-        named = {**found.source.get("columns", {}), **(columns or {})}
+        common, notes = gear_of(gear, nearby, False, (theory, None, reading))
+        named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
         grid = arrow_grid(first.schema, first.column, first.num_rows, 2)
         table = table_of(grid, findings)
@@ -112,15 +112,15 @@ def open_parquet(
             remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
             findings.refuse("no column says which gear a row is of", remedy)
     return Parquet(
-        path.resolve().name if root else path.stem,
-        found,
-        files,
-        root,
-        dataset.schema,
-        used,
-        as_named(table, used),
-        (*source_notes(table, used), *notes),
-        range or found.source.get("measurement", {}).get("range"),
+        name=path.resolve().name if root else path.stem,
+        gear=common,
+        files=files,
+        root=root,
+        schema=dataset.schema,
+        used=used,
+        named=as_named(table, used),
+        notes=(*source_notes(table, used), *notes),
+        range=range or common.source.get("measurement", {}).get("range"),
     )
 
 
@@ -134,15 +134,10 @@ def _plain(schema: "Schema") -> list[str]:
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
-    """Yield the rows of one file, in their order and screened.
-
-    Args:
-        source: where it is from.
-        file: one of its files.
-        skip_bad: as in `read_case`.
+    """Yield the rows of one file of a source, in their order and screened.
 
     Raises:
-        InputError: holds what is wrong with the first batch that is.
+        InputError: holds the faults of the first batch that has some.
     """
     with FileFindings(file) as findings:
         dataset = parquet_table([file], source.root, findings)
@@ -156,17 +151,20 @@ def read_batches(
             grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
             table = ReadTable(tuple(headers), first, grid, rows.num_rows)
             how: dict = {"skip_bad": skip_bad, "whole": False}
-            found = measured_in(table, used, findings, source.gear, **how)
-        if len(found.frame):
-            found, screening = screened(found, wanted, skip_bad, whole=False)
-            found = replace(found, notes=tuple(screening_notes(screening, found.units)))
-        yield found
+            read = measured_in(table, used, findings, source.gear, **how)
+        if len(read.frame):
+            read, screening = screened(read, wanted, skip_bad, whole=False)
+            read = replace(read, notes=tuple(screening_notes(screening, read.units)))
+        yield read
 
 
 def _whole_gears(
     dataset: "Dataset", headers: list[str], specimen: int
 ) -> Iterator[tuple[int, "Table"]]:
-    """Yield rows that end with those of a gear, and the number of the first."""
+    """Yield rows that end with those of a gear, and the number of the first.
+
+    The labels of gears stand in the column at the place `specimen`.
+    """
     import pyarrow
 
     held, first = None, 1

@@ -70,8 +70,9 @@ def named_column(
         remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
         findings.add(words, remedy, table.header_row, header)
         return None
-    contrary = in_header not in (None, unit) and in_header.dimension == unit.dimension
-    against = in_header.name if contrary else ""
+    against = ""
+    if in_header not in (None, unit) and in_header.dimension == unit.dimension:
+        against = in_header.name
     return Column(quantity, header, places[0], unit, against=against)
 
 
