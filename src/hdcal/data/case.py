@@ -178,12 +178,7 @@ class Case:
 
 
 def require_force(case: Case, question: str) -> None:
-    """Raise InputError where torques and angles were measured.
-
-    Args:
-        case: what was measured.
-        question: the command that is asked.
-    """
+    """Raise InputError where torques and angles were measured."""
     if not case.units.is_force:
         words = (
             f"torques over angles are no readings for {question}, which is of forces"

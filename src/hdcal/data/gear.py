@@ -90,7 +90,7 @@ def read_gear(
         if theory is not None and theory not in get_args(Theory):
             remedy = did_you_mean(theory, list(get_args(Theory)))
             wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
-        chosen = theory or _in_table(toml, "gear").get("theory")
+        chosen: Any = theory or _in_table(toml, "gear").get("theory")
         facts = wrong.attempt(_material, toml, path.parent, material, chosen)
         given = wrong.attempt(_given_priors, toml, theory)
     assert isinstance(model, GearFile) and facts is not None and given is not None

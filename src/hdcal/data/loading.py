@@ -18,18 +18,15 @@ from hdcal.screening.turning_points import (
 # A movement counts as a half cycle, or as unloading, from this share of the range;
 # two speeds are clearly different from this ratio. Less rest than the third share,
 # in rows and in time, also comes about by chance at the top of a noisy sine.
-LARGE_MOVE = 0.1
-CLEAR_RATIO = 1.5
-LEAST_REST = 0.02
-
+_LARGE_MOVE, _CLEAR_RATIO, _LEAST_REST = 0.1, 1.5, 0.02
 # One step back over this share of the range, twice as large as any before it, is where
 # the next ramp begins: nothing was read on the way, so no unloading was measured.
-RESET_STEP = 0.5
+_RESET_STEP = 0.5
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How the deformation moved, row by row.
+    """Movement of the deformation, row by row.
 
     Attributes:
         direction: +1 the row was reached by increasing deformation, -1 by
@@ -70,7 +67,7 @@ def loading_side(deformation: np.ndarray) -> int:
         smaller reaches a share of the larger that counts as a movement.
     """
     ends = float(np.max(deformation)), float(-np.min(deformation))
-    if min(ends) > LARGE_MOVE * max(ends):
+    if min(ends) > _LARGE_MOVE * max(ends):
         return 0
     return 1 if ends[0] >= ends[1] else -1
 
@@ -92,7 +89,7 @@ def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
 def movement_words(
     deformation: np.ndarray, name: str = "deformation"
 ) -> dict[int, str]:
-    """Return what to call increasing (+1) and decreasing (-1) deformation.
+    """Return the names of increasing (+1) and decreasing (-1) deformation.
 
     Args:
         deformation: of all rows, as read [mm], shape (n,).
@@ -126,20 +123,24 @@ def derive_motion(
         return Motion(sense, sense, rate, frozenset())
     order = np.argsort(run, kind="stable")
     cuts = np.flatnonzero(np.diff(run[order])) + 1
-    span = float(np.ptp(deformation)) if size else 0.0
     moves: list[list[_Move]] = []
     for rows in np.split(order, cuts):
         clock = None if time is None else time[rows]
         moves.append(_one_run(deformation[rows], clock, rows, direction, rate))
         if moves[-1]:
-            sense[rows] = _sense(direction[rows], moves[-1][0].sign)
+            # The last movement's sign holds on through the rests.
+            moved, place = direction[rows] != 0, np.arange(rows.size)
+            last = np.maximum.accumulate(np.where(moved, place, -1))
+            first = moves[-1][0].sign
+            sense[rows] = np.where(last >= 0, direction[rows][last], first)
+    span = float(np.ptp(deformation)) if size else 0.0
     features = _features(moves, rate, span)
     if any(moves) and _rests(direction, run, time):
-        features |= {"holds"}
+        features.add("holds")
     if features & {"holds", "rates"}:
-        features |= {"holds or rates"}
+        features.add("holds or rates")
     resets = [m.reset for run in moves for m in run if m.reset is not None]
-    return Motion(direction, sense, rate, features, tuple(sorted(resets)))
+    return Motion(direction, sense, rate, frozenset(features), tuple(sorted(resets)))
 
 
 def _one_run(
@@ -171,13 +172,13 @@ def _one_run(
         speed = 0.0
         if time is not None:
             window = max(0.01 * span, 4 * tolerance)
-            local = _speeds(rising, time[part], moving, window)
-            rate[rows[part][own]] = np.where(moving, sign * local, 0.0)[own]
-            speed = _typical(local[moving])
-        travel = float(rising[-1] - rising[0])
+            speeds = _speeds(rising, time[part], moving, window)
+            rate[rows[part][own]] = np.where(moving, sign * speeds, 0.0)[own]
+            speeds = speeds[moving & (speeds > 0)]
+            speed = float(np.median(speeds)) if speeds.size else 0.0
         reset = _reset(x, start, stop, span)
         row = None if reset is None else int(rows[reset])
-        moves.append(_Move(sign, travel, speed, row))
+        moves.append(_Move(sign, float(rising[-1] - rising[0]), speed, row))
         sign = -sign
     return moves
 
@@ -190,7 +191,7 @@ def _reset(x: np.ndarray, start: int, stop: int, span: float) -> int | None:
     back = abs(x[row]) < abs(x[row - 1])
     before = steps[:start]
     fine = before.size >= 3 and float(before[-3:].max()) <= 0.5 * step
-    return row if back and fine and step >= RESET_STEP * span else None
+    return row if back and fine and step >= _RESET_STEP * span else None
 
 
 def _speeds(
@@ -213,59 +214,34 @@ def _speeds(
     return np.where(moving, speed, 0.0)
 
 
-def _typical(speeds: np.ndarray) -> float:
-    speeds = speeds[speeds > 0]
-    return float(np.median(speeds)) if speeds.size else 0.0
-
-
-def _sense(direction: np.ndarray, first: int) -> np.ndarray:
-    """Carry the last movement's sign through the holds."""
-    last = np.maximum.accumulate(
-        np.where(direction != 0, np.arange(direction.size), -1)
-    )
-    return np.where(last >= 0, direction[np.maximum(last, 0)], first)
-
-
 def _rests(direction: np.ndarray, run: np.ndarray, time: np.ndarray | None) -> bool:
+    """Tell whether the deformation was held in enough rows, or for long enough."""
     held = direction == 0
     if np.count_nonzero(held) < 2:
         return False
-    if held.mean() >= LEAST_REST:
-        return True
-    if time is None:
-        return False
+    if time is None or held.mean() >= _LEAST_REST:
+        return bool(held.mean() >= _LEAST_REST)
     order = np.argsort(run, kind="stable")
     steps = np.where(np.diff(run[order]) == 0, np.diff(time[order]), 0.0)
-    return bool(steps[held[order][1:]].sum() >= LEAST_REST * steps.sum() > 0)
+    return bool(steps[held[order][1:]].sum() >= _LEAST_REST * steps.sum() > 0)
 
 
-def _features(
-    moves: list[list[_Move]], rate: np.ndarray, span: float
-) -> frozenset[str]:
-    large = [[m for m in run if m.travel >= LARGE_MOVE * span] for run in moves]
-    signs = {move.sign for run in large for move in run if move.reset is None}
-    found = set()
-    if signs == {1, -1}:
-        found.add("unloading")
-    if any(_pairs(run) >= 2 for run in large):
-        found.add("cycles")
-    if _two_speeds([move for run in large for move in run], rate):
-        found.add("rates")
-    return frozenset(found)
-
-
-def _pairs(run: list[_Move]) -> int:
-    up = sum(move.sign > 0 for move in run)
-    return min(up, len(run) - up)
-
-
-def _two_speeds(large: list[_Move], rate: np.ndarray) -> bool:
-    speeds = [move.speed for move in large if move.speed > 0]
-    if speeds and max(speeds) >= CLEAR_RATIO * min(speeds):
-        return True
+def _features(moves: list[list[_Move]], rate: np.ndarray, span: float) -> set[str]:
+    """Return what the movements of all runs show, but for rests."""
+    large = [[m for m in run if m.travel >= _LARGE_MOVE * span] for run in moves]
+    every = [move for run in large for move in run]
+    features = set()
+    if {move.sign for move in every if move.reset is None} == {1, -1}:
+        features.add("unloading")
+    rising = [sum(move.sign > 0 for move in run) for run in large]
+    if any(min(up, len(run) - up) >= 2 for up, run in zip(rising, large, strict=True)):
+        features.add("cycles")
+    speeds = [move.speed for move in every if move.speed > 0]
+    if speeds and max(speeds) >= _CLEAR_RATIO * min(speeds):
+        return features | {"rates"}
     # speeds within one movement, or a speed that changes all the time
     moving = np.abs(rate[rate != 0])
-    if moving.size < 3:
-        return False
-    slow, fast = np.quantile(moving, [0.1, 0.9])
-    return bool(fast >= CLEAR_RATIO * slow)
+    if moving.size >= 3:
+        slow, fast = np.quantile(moving, [0.1, 0.9])
+        features |= {"rates"} if fast >= _CLEAR_RATIO * slow else set()
+    return features

@@ -145,11 +145,7 @@ NAMES = {
 
 
 def range_of(name: str) -> Range:
-    """Return the range of a quantity, or of a parameter that is one.
-
-    Args:
-        name: a key of `RANGES` or `NAMES`.
-    """
+    """Return the range of a quantity, or of a parameter that is one."""
     return RANGES[NAMES.get(name, name)]
 
 

@@ -143,11 +143,7 @@ def dynamic_priors() -> dict[str, Prior]:
 
 
 def effect_priors(full_scale: FullScale = REFERENCE) -> dict[str, Prior]:
-    """Return shipped priors of the effects' parameters, keyed `effect.parameter`.
-
-    Args:
-        full_scale: of the rig on which the effects act.
-    """
+    """Return shipped priors of the effects' parameters, keyed `effect.parameter`."""
     return {
         name: prior if name in _FACTS else full_scale.own(prior)
         for name, prior in _shipped("effects").items()

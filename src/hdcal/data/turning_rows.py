@@ -38,37 +38,40 @@ def sense_at_turns(
     rows = edges[1:-1] - 1
     turned = (run[order][rows] == run[order][rows + 1]) if rows.size else rows > 0
     count = np.where(turned, np.minimum(np.minimum(before, after), _MOST), 0)
-    errors, squares, freedom = [], 0.0, 0
-    for size in range(_FEWEST, _MOST + 1):
-        at = rows[count == size]
-        if at.size:
-            error, left, free = _two_branches(x, y, at, size)
-            errors.append((at, error))
-            squares, freedom = squares + left, freedom + free
-    if not errors:
+    sizes = [size for size in range(_FEWEST, _MOST + 1) if np.any(count == size)]
+    if not sizes:
         return sense
-    noise = np.sqrt(squares / freedom) + _ROUNDING * np.max(np.abs(y))
-    for at, error in errors:
+    fits = [_two_branches(x, y, rows[count == size], size) for size in sizes]
+    freedom = sum(free for *_, free in fits)
+    noise = np.sqrt(sum(squares for _, squares, _ in fits) / freedom)
+    noise += _ROUNDING * np.max(np.abs(y))
+    for size, (error, *_) in zip(sizes, fits, strict=True):
         score = np.log1p((error / noise) ** 2 / freedom)
         likelier = 0.5 * (freedom + 1) * (score[0] - score[1])
-        late = at[likelier > np.log(_BEFORE / (1.0 - _BEFORE))]
+        late = rows[count == size][likelier > np.log(_BEFORE / (1.0 - _BEFORE))]
         sign[late] = sign[late + 1]
-    found = np.empty_like(sense)
-    found[order] = sign
-    return found
+    senses = np.empty_like(sense)
+    senses[order] = sign
+    return senses
 
 
-def _two_branches(x: np.ndarray, y: np.ndarray, at: np.ndarray, size: int):
-    """Return what two branches leave of the force at the row between them."""
+def _two_branches(
+    x: np.ndarray, y: np.ndarray, at: np.ndarray, size: int
+) -> tuple[np.ndarray, float, int]:
+    """Return how two branches predict the force at the turning rows between them.
+
+    Returns:
+        Errors of the prediction from before and from after the turn, over their
+        standard errors for a noise of one, shape (2, t); the sum of squares that the
+        branches leave; and its degrees of freedom.
+    """
     steps = np.concatenate([np.arange(-size, 0), np.arange(1, size + 1)])
     near = at[:, None] + steps
     u = x[near] - x[at][:, None]
     u /= np.maximum(np.max(np.abs(u), axis=1, keepdims=True), np.finfo(float).tiny)
     side = np.broadcast_to(np.sign(steps), u.shape)
-    columns = [np.ones_like(u), side, u]
-    if size >= _CURVED:
-        columns += [side * u, u**2]
-    design = np.stack(columns, axis=2)
+    curved = [side * u, u**2] if size >= _CURVED else []
+    design = np.stack([np.ones_like(u), side, u, *curved], axis=2)
     inverse = np.linalg.pinv(design)
     fitted = np.einsum("tpn,tn->tp", inverse, y[near])
     left = y[near] - np.einsum("tnp,tp->tn", design, fitted)

@@ -7,7 +7,6 @@ N*m.
 import math
 import re
 import unicodedata
-from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple
 
@@ -88,12 +87,13 @@ _OF_PRIORS = {
     "%": (1e-2, (0, 0, 0, 0)),
 }
 _CODE_UNITS = ("N", "mm", "s", "K")
+_NONE = (0, 0, 0, 0)
 _POWERS = {
     "force": (1, 0, 0, 0),
     "length": (0, 1, 0, 0),
     "time": (0, 0, 1, 0),
     "temperature": (0, 0, 0, 1),
-    "angle": (0, 0, 0, 0),
+    "angle": _NONE,
 }
 _NUMBER = re.compile(r"\d+(\.\d*)?([eE][+-]?\d{1,2})?", re.ASCII)
 _FACTOR = re.compile(r"(?P<name>[^\W\d]+|°[CF]?|[%′″])((\^|\*\*)(?P<power>-?[1-9]))?")
@@ -159,7 +159,14 @@ def to_code(unit: str) -> tuple[float, str]:
         UnitError: the text is not a product of known mechanical units.
     """
     factor, powers = _product(unit)
-    return factor, _name(powers)
+    if powers == (1, -2, 0, 0):
+        return factor, "MPa"
+    above, below = [], []
+    for name, power in zip(_CODE_UNITS, powers, strict=True):
+        size = "" if abs(power) == 1 else f"^{abs(power)}"
+        if power:
+            (above if power > 0 else below).append(name + size)
+    return factor, "/".join(["*".join(above) or "1", *below])
 
 
 def unit_powers(unit: str) -> tuple[int, ...]:
@@ -168,16 +175,15 @@ def unit_powers(unit: str) -> tuple[int, ...]:
     Raises:
         UnitError: as `to_code`.
     """
-    return tuple(map(int, _product(unit)[1]))
+    return _product(unit)[1]
 
 
 @cache
-def _product(unit: str) -> tuple[float, np.ndarray]:
+def _product(unit: str) -> tuple[float, tuple[int, ...]]:
     """Scale of a product of units, and its powers of the code units."""
     if len(unit) > _LONGEST:
         raise UnitError("the unit is longer than any unit can be")
-    factor, powers = 1.0, np.zeros(len(_CODE_UNITS), int)
-    sign = 1
+    factor, powers, sign = 1.0, _NONE, 1
     text = unit.replace(" ", "").replace("·", "*")
     # "**" is a power, a single "*" or "/" joins factors
     for part in re.split(r"(?<!\*)(\*|/)(?!\*)", text) if text else []:
@@ -186,19 +192,18 @@ def _product(unit: str) -> tuple[float, np.ndarray]:
             continue
         scale, its_powers = _factor(part, unit)
         factor *= scale**sign
-        powers += sign * its_powers
+        powers = tuple(p + sign * q for p, q in zip(powers, its_powers, strict=True))
     if not (0.0 < factor < math.inf):
         raise UnitError(f"'{unit}' is not a usable scale")
     return factor, powers
 
 
-def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
+def _factor(part: str, unit: str) -> tuple[float, tuple[int, ...]]:
     """Scale of one factor, and its powers of the code units."""
     if _NUMBER.fullmatch(part):
-        scale = float(part)
-        if not scale > 0.0:
+        if not float(part) > 0.0:
             raise UnitError(f"'{unit}' has a scale of zero")
-        return scale, np.zeros(len(_CODE_UNITS), int)
+        return float(part), _NONE
     match = _FACTOR.fullmatch(part)
     if match is None:
         raise UnitError(f"'{unit}' is not a unit")
@@ -210,16 +215,4 @@ def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
         scale, powers = known.size, _POWERS[known.dimension]
     else:
         raise UnitError(f"'{name}' is not a unit")
-    return scale**power, np.array(powers) * power
-
-
-def _name(powers: Iterable[int]) -> str:
-    """The code unit of these powers of N, mm, s and K."""
-    if tuple(powers) == (1, -2, 0, 0):
-        return "MPa"
-    above, below = [], []
-    for name, power in zip(_CODE_UNITS, powers, strict=True):
-        size = "" if abs(power) == 1 else f"^{abs(power)}"
-        if power:
-            (above if power > 0 else below).append(name + size)
-    return "/".join(["*".join(above) or "1", *below])
+    return scale**power, tuple(power * p for p in powers)

@@ -126,10 +126,6 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
     """Return sizes that are missing, and relations between those that are there.
 
     Checked whatever else is wrong.
-
-    Args:
-        toml: the gear file.
-        theory: overrides the one in the file.
     """
     table = toml.table.get("gear")
     if not isinstance(table, dict):

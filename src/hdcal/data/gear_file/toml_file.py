@@ -64,10 +64,6 @@ class TomlFile:
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
     """Read and parse a TOML file.
 
-    Args:
-        source: a path, or a file shipped with hdcal.
-        file: its name in findings.
-
     Raises:
         InputError: missing, unreadable, too large, or not TOML.
     """

@@ -51,13 +51,6 @@ def checked(
 ) -> M:
     """Return data as a model of pydantic.
 
-    Args:
-        kind: the model.
-        data: as parsed.
-        toml: the file in which they stand.
-        key: dotted key there; empty at the top.
-        context: of the validators.
-
     Raises:
         InputError: holds everything that is wrong with the data.
     """

@@ -19,9 +19,6 @@ def mountings(frame: pd.DataFrame) -> tuple[np.ndarray, tuple[str, ...]]:
 
     The same label of a run on two gears is two mountings, and so are the rows before
     and after a jump of a zero.
-
-    Args:
-        frame: of the rows, with columns specimen, run and zero, the jumps before a row.
     """
     keys = ["specimen", "run", "zero"]
     index = frame.groupby(keys, sort=False, observed=True).ngroup().to_numpy()

@@ -114,13 +114,7 @@ def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator
 
 
 def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[str]:
-    """Yield by what mountings are told apart, where no column `run` does that.
-
-    Args:
-        stated: quantities that the source states.
-        runs: number of mountings.
-        gears: number of gears.
-    """
+    """Yield by what mountings are told apart, where no column `run` does that."""
     telling = [name for name in TELLING if name in stated]
     if "run" in stated or runs <= gears or not telling:
         return

@@ -37,11 +37,6 @@ def _array_grid(names: Sequence[str], columns: Sequence[np.ndarray]) -> ArrayGri
 def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
     """Return the grid of a table in memory, and the hash of its cells.
 
-    Args:
-        data: a pandas DataFrame, another library's that can become one, or a mapping of
-            names to arrays of one length.
-        findings: of the table.
-
     Raises:
         InputError: arrays of several lengths, or of more than one dimension; headers
             of several levels.

@@ -69,13 +69,7 @@ class ReadTable:
 
 
 def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str, ...]]:
-    """Return the readings of a grid under their headers, and the titles above these.
-
-    Args:
-        grid: of a source.
-        findings: of the source; gets one for each kind of line that is neither a
-            reading nor anything else.
-    """
+    """Return the readings of a grid under their headers, and the titles above these."""
     sample = _sample(grid)
     counted, empty = _kinds(sample)
     known = _are_readings(sample, counted)

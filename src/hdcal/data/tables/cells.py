@@ -40,10 +40,6 @@ def unit_in(cell: str) -> str:
 def read_number(cell: str, comma: bool) -> float:
     """Return the number in a cell.
 
-    Args:
-        cell: without blanks around it.
-        comma: whether its file is written with decimal commas.
-
     Raises:
         CellError: it is no finite number.
     """

@@ -136,12 +136,7 @@ class OtherLines:
             yield f"a table of other columns is not read: {rows}"
 
     def assumed(self, heading: Heading, headings: int) -> Iterator[str]:
-        """Yield notes on what was assumed.
-
-        Args:
-            heading: of the first block.
-            headings: number of headings.
-        """
+        """Yield notes on what was assumed."""
         if self._above:
             names = ", ".join(map(quoted, heading.names))
             lines = _lines(self._above)

@@ -48,11 +48,6 @@ def parquet_files(path: Path) -> list[str]:
 def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "Dataset":
     """Return files as one table; names of folders such as `lot=7` are texts.
 
-    Args:
-        files: some of those of a folder, or one.
-        root: the folder; empty where it is one file.
-        findings: of the data.
-
     Raises:
         InputError: they cannot be read, or a column is of several kinds.
     """

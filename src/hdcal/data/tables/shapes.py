@@ -119,10 +119,6 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
 def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> ReadTable:
     """Return sheets below each other, with a column that names the sheet.
 
-    Args:
-        grids: of the sheets, by name.
-        findings: of the workbook; gets the sheet and row of each row of the table.
-
     Raises:
         InputError: their columns differ, or one of them names specimens itself.
     """

@@ -40,11 +40,6 @@ _GAP = re.compile(r"\s{2,}")
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
     """Return the bytes of a text; give up at the first sign that it is no table.
 
-    Args:
-        path: of the file.
-        findings: of the file.
-        wide: the text may hold zeros.
-
     Raises:
         InputError: the file is binary, or has a line over 1 MiB.
     """
@@ -126,9 +121,6 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
 
     The separator is that of most lines of numbers; without such lines, that of the
     first line.
-
-    Args:
-        text: with plain newlines.
     """
     lines, notes = text.split("\n"), []
     separator, width = _dialect(lines)

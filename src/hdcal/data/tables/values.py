@@ -52,11 +52,6 @@ def without_slow_channels(
     A channel that is read more seldom than others leaves most of its cells empty. Where
     it is no required one, it is not used.
 
-    Args:
-        table: the readings.
-        used: columns by quantity.
-        required: quantities without which a row is no reading.
-
     Returns:
         The rows, the columns that are used, and notes on what is left out.
     """
