@@ -90,16 +90,15 @@ class Case:
         name: stem of the file, or name of the folder.
         gear: the gear and its priors.
         records: the rows.
-        run_labels: label of each run index.
-        specimen_labels: label of each specimen index.
+        run_labels: of each run index.
+        specimen_labels: of each specimen index.
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
-        lots: lot of each specimen index; empty where none is stated.
-        operators: who mounted each run index; empty where none is stated.
-        rigs: which rig read each run index; empty where none is stated.
-        dates: first date of each run index in ISO 8601, empty for a run without one;
-            empty where none is stated.
+        lots: of each specimen index; empty where none is stated, as the next three.
+        operators: of each run index.
+        rigs: of each run index.
+        dates: first one of each run index in ISO 8601, empty for a run without one.
         left_out: specimens left out because of a faulty row, each with the finding;
             empty unless `skip_bad` was given.
         excluded: deformations as read whose rows were left out because the part gave

@@ -16,7 +16,7 @@ _SEPARATORS = re.compile(r"([;,|\t\r\n])")
 def without_formula(text: str) -> str:
     """Return a text as it may stand in a cell; numbers are no formulas."""
     parts = _SEPARATORS.split(text)
-    # What has been guarded by somebody else gets an apostrophe more, and keeps its own.
+    # A part that is guarded already gets one more apostrophe, and keeps its own.
     parts[::2] = [f"'{part}" if _runs(part) else part for part in parts[::2]]
     guard = "'" if text.lstrip("'").startswith(_BLANK) else ""
     return guard + "".join(parts)
@@ -24,23 +24,19 @@ def without_formula(text: str) -> str:
 
 def with_formula(cell: str) -> str:
     """Return the text that `without_formula` made a cell of."""
-    if cell.startswith("'") and cell.lstrip("'").startswith(_BLANK):
-        cell = cell[1:]
+    if cell.lstrip("'").startswith(_BLANK):
+        cell = cell.removeprefix("'")
     parts = _SEPARATORS.split(cell)
-    parts[::2] = [
-        part[1:] if part.startswith("'") and _runs(part) else part
-        for part in parts[::2]
-    ]
+    parts[::2] = [p.removeprefix("'") if _runs(p) else p for p in parts[::2]]
     return "".join(parts)
 
 
 def _runs(part: str) -> bool:
-    return part.lstrip("'").startswith(_RUN) and not _is_number(part)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
+    """Tell whether a spreadsheet would run a part: a formula, and no number."""
+    if not part.lstrip("'").startswith(_RUN):
         return False
-    return True
+    try:
+        float(part)
+    except ValueError:
+        return True
+    return False

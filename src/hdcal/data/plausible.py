@@ -52,6 +52,8 @@ class Range(NamedTuple):
 
 _SCATTER = "from nothing to as large as the largest force"
 _STEEL = "from the softest gel to ten times diamond"
+_CAPACITY = "from a letter scale's to a large ship's"
+_MASS = "from a nanogram to a million tonnes"
 RANGES = {
     # readings
     "deformation": Range(-1e5, 1e5, "mm", "no rig is two hundred metres long"),
@@ -68,9 +70,7 @@ RANGES = {
     # the gear and its priors
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
-    "load_cell_capacity": Range(
-        1e-3, 1e9, "N", "from a letter scale's to a large ship's"
-    ),
+    "load_cell_capacity": Range(1e-3, 1e9, "N", _CAPACITY),
     "filter": Range(1e-6, 1e9, "Hz", "from a reading in ten days to a radio's"),
     "K": Range(1e-6, 1e6, "", "a millionth to a million times the theory"),
     "spring_stiffness": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
@@ -80,13 +80,7 @@ RANGES = {
     "correlation": Range(0.0, 1.0, "", "from independent to all alike"),
     "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
     "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
-    "mass": Range(
-        1e-15,
-        1e6,
-        "N·s²/mm",
-        "from a nanogram to a million tonnes",
-        written=(1e3, "kg"),
-    ),
+    "mass": Range(1e-15, 1e6, "N·s²/mm", _MASS, written=(1e3, "kg")),
     "damping_ratio": Range(1e-9, 1e3, "", "from a bell to tar"),
     "initial_velocity": Range(-1e9, 1e9, "mm/s", "far beyond the speed of sound"),
     "deformation_sigma": Range(1e-15, 1e3, "mm", "from nothing to a metre"),
@@ -121,26 +115,26 @@ RANGES = {
 }
 # Parameters, keys of files and options that are such a quantity under another name.
 NAMES = {
-    **dict.fromkeys(("at", "window"), "deformation"),
-    **dict.fromkeys(("deformation_offset", "initial_deformation"), "deformation"),
-    **dict.fromkeys(("limit_force", "given_force", "amplitude"), "force"),
-    "force_offset": "force",
-    **dict.fromkeys(("run_offset_sd", "gap_sd", "force_tolerance"), "sigma"),
-    **dict.fromkeys(("temperatures", "reference_temperature"), "temperature"),
-    **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), "size"),
-    **dict.fromkeys(("nominal_deformation", "gauge_range"), "size"),
-    "displacement_pitch": "size",
-    "expanded_N": "force_resolution",
-    "expanded_mm": "deformation_sigma",
-    **dict.fromkeys(("content", "confidence", "required_probability"), "share"),
-    **dict.fromkeys(("probability", "interval"), "share"),
-    "noise_correlation": "correlation",
-    "tolerances": "tolerance",
-    "rates": "rate",
-    "degrees": "degree",
-    "mass_ratio": "K",
-    "spring_alpha": "alpha",
-    "spring_modulus": "E0",
+    name: quantity
+    for quantity, names in {
+        "deformation": "at window deformation_offset initial_deformation",
+        "force": "limit_force given_force amplitude force_offset",
+        "sigma": "run_offset_sd gap_sd force_tolerance",
+        "temperature": "temperatures reference_temperature",
+        "size": "wall_thickness radius length load_height nominal_deformation "
+        "gauge_range displacement_pitch",
+        "force_resolution": "expanded_N",
+        "deformation_sigma": "expanded_mm",
+        "share": "content confidence required_probability probability interval",
+        "correlation": "noise_correlation",
+        "tolerance": "tolerances",
+        "rate": "rates",
+        "degree": "degrees",
+        "K": "mass_ratio",
+        "alpha": "spring_alpha",
+        "E0": "spring_modulus",
+    }.items()
+    for name in names.split()
 }
 
 
@@ -162,8 +156,11 @@ def implausible(name: str, given: Any, quantity: str = "") -> list[Finding]:
 
 def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
     """Return a finding as `implausible` does, of a range that is known."""
-    numbers = [] if given is None else _flat(given)
-    for number in numbers:
+    numbers = given if isinstance(given, list | tuple) else [given]
+    if hasattr(given, "ravel"):  # NumPy, without importing it
+        # Of millions these say enough; each is NaN where one is.
+        numbers = [given.min().item(), given.max().item()] if given.size else []
+    for number in [] if given is None else numbers:
         if isinstance(number, str):
             return [Finding(name, f"{quoted(number)} is no number", "Give one")]
         if not known.holds(number):
@@ -171,10 +168,3 @@ def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
             unit = " and its unit" if known.unit else ""
             return [Finding(name, words, f"Check the number{unit}")]
     return []
-
-
-def _flat(given: Any) -> list:
-    if hasattr(given, "ravel"):  # NumPy, without importing it
-        # Of millions these say enough; each is NaN where one is.
-        return [given.min().item(), given.max().item()] if given.size else []
-    return list(given) if isinstance(given, list | tuple) else [given]

@@ -1,7 +1,9 @@
-"""What may be opened: regular files of a stated size, nothing endless."""
+"""Files that may be opened: regular ones of a stated size, nothing endless."""
 
 import stat
 from pathlib import Path
+
+_UNITS = {1 << 10: "KiB", 1 << 20: "MiB", 1 << 30: "GiB"}
 
 
 def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
@@ -14,21 +16,15 @@ def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
         largest: size that is still read [bytes].
     """
     try:
-        found = path.stat()
+        status = path.stat()
     except (OSError, ValueError):
         return None
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         return "is a folder", "Name the file inside it"
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return "is a pipe or a device, which may never end", "Write it to a file first"
-    if found.st_size > largest:
-        return f"is larger than {_size(largest)}", "Name another file, or thin this out"
+    if status.st_size > largest:
+        unit = max(one for one in _UNITS if largest >= one)
+        words = f"is larger than {largest // unit} {_UNITS[unit]}"
+        return words, "Name another file, or thin this out"
     return None
-
-
-def _size(largest: int) -> str:
-    unit, words = max((u, w) for u, w in _UNITS if largest >= u)
-    return f"{largest // unit} {words}"
-
-
-_UNITS = ((1 << 10, "KiB"), (1 << 20, "MiB"), (1 << 30, "GiB"))

@@ -1,4 +1,4 @@
-"""Where the shipped prior tables and data sets are."""
+"""Folders of the shipped prior tables, data sets and pages."""
 
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -9,7 +9,7 @@ _FOR_THE_WEB = ("api", "schemas")
 
 
 def priors_folder() -> Traversable:
-    """Folder of the prior tables: `rig.toml`, `effects.toml` and the materials.
+    """Return the folder of the prior tables: the rig's, the effects' and materials.
 
     Raises:
         FileNotFoundError: the installation carries no prior tables.
@@ -18,7 +18,7 @@ def priors_folder() -> Traversable:
 
 
 def datasets_folder() -> Traversable:
-    """Folder of the example data sets, one subfolder each.
+    """Return the folder of the example data sets, one subfolder each.
 
     Raises:
         FileNotFoundError: the installation carries no data sets.
@@ -44,10 +44,9 @@ def pages() -> dict[str, Traversable]:
 
 def _shipped(name: str) -> Traversable:
     # pathlib.Path and zipfile.Path both know their parent; Traversable does not.
-    package: Any = files("hdcal.data")
-    package = package.parent
-    checkout = package.parent.parent
-    for candidate in (package / "_data" / name, checkout / name):
+    data: Any = files("hdcal.data")
+    package = data.parent
+    for candidate in (package / "_data" / name, package.parent.parent / name):
         if candidate.is_dir():
             return candidate
     raise FileNotFoundError(f"this installation of hdcal has no '{name}' folder")

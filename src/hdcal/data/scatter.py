@@ -11,7 +11,7 @@ _NOTHING = 1e-8
 
 
 def require_scatter(case: Case) -> None:
-    """Refuse readings that say nothing of their noise, where nothing else does.
+    """Refuse readings without scatter, where nothing else states their noise.
 
     Raises:
         InputError: they lie on straight lines to the last digit, and neither the step
@@ -21,7 +21,7 @@ def require_scatter(case: Case) -> None:
     if case.gear.force_resolution > 0.0 or np.any(np.asarray(records.force_sd) > 0.0):
         return
     force = np.asarray(records.force)
-    # Of many gears the first rows alone are at hand, or none of what is asked about.
+    # Of many gears the first rows alone are at hand, or none of those that are asked.
     if not len(force):
         return
     if np.max(np.abs(left_of_lines(records, force))) > _NOTHING * np.max(np.abs(force)):
@@ -44,10 +44,7 @@ def require_scatter(case: Case) -> None:
 
 
 def reading_step(case: Case) -> float:
-    """Return the step of the force display, or else the least between two forces [N].
-
-    Zero where all forces are the same.
-    """
+    """Return the step of the force display, or else `least_step` [N]."""
     return case.gear.force_resolution or least_step(case.records.force)
 
 
@@ -55,19 +52,12 @@ def least_step(force) -> float:
     """Return the least difference of two forces [N]; zero where all are the same."""
     force = np.asarray(force)
     steps = np.diff(np.unique(force))
-    if not len(steps):
-        return 0.0
-    steps = steps[steps > _NOTHING * np.max(np.abs(force))]
+    steps = steps[steps > _NOTHING * np.max(np.abs(force))] if len(steps) else steps
     return float(np.min(steps)) if len(steps) else 0.0
 
 
 def left_of_lines(records: Records, values: np.ndarray) -> np.ndarray:
-    """Return what a line of each specimen, with a zero of each run, leaves.
-
-    Args:
-        records: the rows.
-        values: over their deformation, shape (n,).
-    """
+    """Return values, shape (n,), less a line of each specimen, zeros of runs apart."""
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
     x, y = (
         less_run_means(np.asarray(each), run) for each in (records.deformation, values)

@@ -47,12 +47,11 @@ _ALIASES = {
 _LETTERS = {"F": "force", "T": "temperature", "t": "time", "M": "torque"}
 # What says that a column is something else about the quantity.
 _OTHERWISE = """
-    setpoint set target command soll sollwert consigne rate speed error max
-    maximum min minimum peak mean average sd std deviation offset tare limit
-    grenze diameter durchmesser diametre thickness dicke epaisseur width
-    breite largeur length lange longueur height hohe hauteur position
-    separation ecartement abstand compensation radius pitch corrected
-    korrigiert corrige
+    setpoint set target command soll sollwert consigne rate speed error max maximum min
+    minimum peak mean average sd std deviation offset tare limit grenze diameter
+    durchmesser diametre thickness dicke epaisseur width breite largeur length lange
+    longueur height hohe hauteur position separation ecartement abstand compensation
+    radius pitch corrected korrigiert corrige
 """
 # What says no more about a column.
 _FILLERS = "no nr number nummer id numero ch channel in"
@@ -67,20 +66,18 @@ _TRAILING = re.compile(r"(.*\S)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)(\S+)\s*")
 _WIDE = re.compile("[\u3040-\u30ff\u4e00-\u9fff]")
 _LONGEST = 120
 # Units of other things, which a row of units may hold.
-_OTHER_UNITS = """
-    % V mV A mA Hz kHz - -- 1 d bar Pa kPa MPa GPa psi g kg t lb lbs oz με με
-    mm/mm mm² mm^2 mm2 J W ℃ Volt Volts dB
-"""
+_OTHER_UNITS = """% V mV A mA Hz kHz - -- 1 d bar Pa kPa MPa GPa psi g kg t lb lbs oz
+    με με mm/mm mm² mm^2 mm2 J W ℃ Volt Volts dB"""
 # Those of them that behind a header are more likely a part of its name.
 _NAMES = "- -- 1 d t A J W"
+_MASSES = {"g": "gf", "kg": "kgf"}
+_EITHER = {"lb": "lbf", "lbs": "lbf", "oz": "ozf"}
+_TORQUES = {"lbin": "lbf*in", "inlb": "lbf*in", "lbft": "lbf*ft", "ftlb": "lbf*ft"}
 _ADVICE = {
-    "a mass; its weight is": ("g", "kg", "t"),
-    "a mass or a force; as a force it is": ("lb", "lbs", "oz"),
-    "a torque written without force; it is": ("lbin", "inlb", "lbft", "ftlb"),
+    "a mass; its weight is": _MASSES | {"t": "1000 kgf"},
+    "a mass or a force; as a force it is": _EITHER,
+    "a torque written without force; it is": _TORQUES,
 }
-_FORCES = {"g": "gf", "kg": "kgf", "t": "1000 kgf", "lb": "lbf", "lbs": "lbf"}
-_FORCES |= {"oz": "ozf", "lbin": "lbf*in", "inlb": "lbf*in"}
-_FORCES |= {"lbft": "lbf*ft", "ftlb": "lbf*ft"}
 
 
 class Header(NamedTuple):
@@ -136,12 +133,11 @@ def parse_header(text: str) -> Header:
 
 def split_unit(text: str) -> tuple[str, str]:
     """Split headers such as 'Load [kN]', 'Load / kN' and 'load_kN' at their units."""
-    found = _BRACKETED.fullmatch(text)
-    if found is not None:
-        return found[1], found[2]
-    found = _TRAILING.fullmatch(text)
-    if found is not None and found[2] not in _NAMES.split() and is_unit_text(found[2]):
-        return found[1], found[2]
+    if (parts := _BRACKETED.fullmatch(text)) is not None:
+        return parts[1], parts[2]
+    parts = _TRAILING.fullmatch(text)
+    if parts is not None and parts[2] not in _NAMES.split() and is_unit_text(parts[2]):
+        return parts[1], parts[2]
     return text, ""
 
 
@@ -157,9 +153,9 @@ def unit_advice(text: str, quantity: str) -> str:
     names = unit_names(DIMENSIONS[quantity])
     bare = re.sub(r"[\s·*.-]", "", text)
     near = [name for name in names if name.lower() == bare.lower()]
-    for words, units in _ADVICE.items():
-        if bare in units:
-            return f"{text} is {words} {_FORCES[bare]}"
+    for words, forces in _ADVICE.items():
+        if bare in forces:
+            return f"{text} is {words} {forces[bare]}"
     if bare in ("V", "mV", "Volt", "Volts"):
         return f"{text} is a raw signal: multiply it by its calibration first"
     hint = f" (did you mean {near[0]}?)" if near else ""
@@ -168,7 +164,7 @@ def unit_advice(text: str, quantity: str) -> str:
 
 def weight_unit(text: str) -> str:
     """Return the unit of the weight of a mass in this unit; empty for any other."""
-    return _FORCES.get(text, "") if text in ("g", "kg", "lb", "lbs", "oz") else ""
+    return (_MASSES | _EITHER).get(text, "")
 
 
 def _words(name: str) -> list[str]:
