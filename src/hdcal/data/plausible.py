@@ -156,11 +156,13 @@ def implausible(name: str, given: Any, quantity: str = "") -> list[Finding]:
 
 def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
     """Return a finding as `implausible` does, of a range that is known."""
-    numbers = given if isinstance(given, list | tuple) else [given]
+    numbers: Any = given
     if hasattr(given, "ravel"):  # NumPy, without importing it
         # Of millions these say enough; each is NaN where one is.
         numbers = [given.min().item(), given.max().item()] if given.size else []
-    for number in [] if given is None else numbers:
+    elif not isinstance(given, list | tuple):
+        numbers = [] if given is None else [given]
+    for number in numbers:
         if isinstance(number, str):
             return [Finding(name, f"{quoted(number)} is no number", "Give one")]
         if not known.holds(number):
