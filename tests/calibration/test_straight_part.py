@@ -45,9 +45,20 @@ def test_a_line_and_a_chosen_range_have_no_other_part():
     assert not takes_straight_part(read(*toe(contact=0.0)))
     assert not takes_straight_part(read(*toe(), range="all"))
     assert not takes_straight_part(read(*toe(), range="0.1:0.9"))
+
+
+def test_cycles_share_what_is_parallel_of_them():
     x, y = toe()
     cycles = np.concatenate([x, x[::-1]] * 3), np.concatenate([y, y[::-1]] * 3)
-    assert not takes_straight_part(read(*cycles))
+    part = read(*cycles).screening.straight
+    assert part.slope == pytest.approx(80.0, rel=0.002) and not part.whole
+    assert (part.low, part.high) == pytest.approx((0.37, 1.0), abs=0.05)
+    assert takes_straight_part(read(*cycles))
+    kept = read(*cycles, range="straight")
+    assert kept.excluded_sense == 0 and len(kept.records.force) == part.rows.sum()
+    # A loop that is wider the farther it goes has no parallel branches.
+    wide = cycles[1] + 20.0 * cycles[0] * np.sign(np.gradient(cycles[0]))
+    assert read(cycles[0], wide).screening.straight is None
 
 
 def test_the_straight_part_has_one_branch():

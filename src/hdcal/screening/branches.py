@@ -20,6 +20,9 @@ _BRANCH, _CYCLES, _MOST_MOVEMENTS = 0.1, 3, 12
 _BOTH_SIDES = 0.5
 # A hold has so many times as many rows of one reading as a movement.
 _HOLD = 3.0
+# Movements share a straight part from this share of the longest one on; it is parallel
+# where slopes differ by no more than so many standard errors, or by this share.
+_SHARED, _APART, _ALIKE = 0.5, 3.0, 0.005
 # A movement is large from this share of the largest force on.
 _LARGE = 0.5
 
@@ -51,8 +54,10 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
 
     That is the loading, as testing standards have it. Of cycles it is the largest
     movement that is straight as a whole, where at least half of them are: a part that
-    yields once goes back and forth along another line. In a loop none is straight, and
-    the stiffness is that of all of it. Rows that only repeat a reading add nothing.
+    yields once goes back and forth along another line. Where they are not, but are
+    parallel over a range that they share, it is that range of all of them. In a loop
+    none is straight, and the stiffness is that of all of it. Rows that only repeat a
+    reading add nothing.
     """
     rows = one.distinct()
     if rows.size < _FEWEST:
@@ -64,9 +69,12 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     found = [longest_straight(one.x[b], one.y[b], one.scatter) for b in branches]
     pairs = list(zip(branches, found, strict=True))
     if largest.size >= _CYCLES:
-        pairs = [(b, s) for b, s in pairs if s.whole and b.size >= _SHOWN]
-        if 2 * len(pairs) < len(branches):
+        shown = [(b, s) for b, s in pairs if b.size >= _SHOWN]
+        pairs = [(b, s) for b, s in shown if s.whole]
+        if 2 * len(shown) < len(branches):
             return None
+        if 2 * len(pairs) < len(branches):
+            return _parallel_part(one, shown, n)
     else:
         height = [abs(float(one.y[b[-1]] - one.y[b[0]])) for b in branches]
         large = [i for i, h in enumerate(height) if h >= _LARGE * height[0]]
@@ -75,17 +83,55 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     part = branch[straight.rows]
     if not np.ptp(one.x[part]):
         return None
-    low, high = float(one.x[part].min()), float(one.x[part].max())
+    slope, sd = _slope(one, part, straight.inflation)
+    return _part_of(one, part, n, (slope, sd), whole=all(each.whole for each in found))
+
+
+def _parallel_part(
+    one: Run, movements: list[tuple[np.ndarray, "Straight"]], n: int
+) -> StraightPart | None:
+    """Return what movements share of their straight parts, if these are parallel."""
+    ends = [one.x[rows[straight.rows]] for rows, straight in movements]
+    low, high = max(e.min() for e in ends), min(e.max() for e in ends)
+    if high - low < _SHARED * max(float(np.ptp(e)) for e in ends):
+        return None
+    parts = [
+        rows[(one.x[rows] >= low) & (one.x[rows] <= high)] for rows, _ in movements
+    ]
+    if min(part.size for part in parts) < _FEWEST:
+        return None
+    inflations = [straight.inflation for _, straight in movements]
+    slopes, sds = np.transpose(
+        [_slope(one, part, wide) for part, wide in zip(parts, inflations, strict=True)]
+    )
+    weight = 1.0 / np.maximum(sds, 1e-300) ** 2
+    slope = float(weight @ slopes / weight.sum())
+    if np.any(np.abs(slopes - slope) > np.maximum(_APART * sds, _ALIKE * abs(slope))):
+        return None
+    rows = np.unique(np.concatenate(parts))
+    return _part_of(one, rows, n, (slope, float(weight.sum() ** -0.5)), whole=False)
+
+
+def _part_of(
+    one: Run, part: np.ndarray, n: int, line: tuple[float, float], *, whole: bool
+) -> StraightPart:
+    """Return rows of a run with the slope of their line and its standard error."""
     inside = np.zeros(n, bool)
     inside[one.rows[one.with_repeats(part)]] = True
+    low, high = float(one.x[part].min()), float(one.x[part].max())
+    return StraightPart(low, high, inside, *line, whole)
+
+
+def _slope(one: Run, part: np.ndarray, inflation: float) -> tuple[float, float]:
+    """Return the slope of some rows of a movement and its standard error.
+
+    Neighbours err alike: of means of rows, beyond which the memory is small.
+    """
     slope, sd = _line(one.x[part], one.y[part], one.scatter)
-    # Neighbours that err alike: of means of rows, beyond which the memory is small.
     px, py = (_means(values[part], _edges_of(part.size)) for values in (one.x, one.y))
     rows_each = part.size / px.size
     of_means = _line(px, py, one.scatter / math.sqrt(rows_each))[1]
-    sd = max(sd, of_means) * math.sqrt(straight.inflation)
-    whole = all(each.whole for each in found)
-    return StraightPart(low, high, inside, slope, sd, whole)
+    return slope, max(sd, of_means) * math.sqrt(inflation)
 
 
 def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:

@@ -1,7 +1,7 @@
 """Single channels: a clock that is reset, saturation, a gauge that trembles."""
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, wilcoxon
 
 from hdcal.screening.turning_points import turning_points
 
@@ -124,9 +124,12 @@ def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
     bend_x, bend_y = bend_x[usual], bend_y[usual]
     parts = bend_x * (bend_x - bend_y / slope) / 6.0
     variance = float(parts.mean())
-    # neighbouring second differences share readings: half of them are independent
-    error = float(parts.std()) / np.sqrt(parts.size / 2.0)
-    clear = variance > norm.isf(_LEVEL) * error
+    if variance <= 0.0 or not parts.any():
+        return 0.0
+    # Without scatter the parts lie about zero. Neighbouring second differences share
+    # readings: half of them are independent.
+    found = wilcoxon(parts, alternative="greater", method="asymptotic")
+    clear = float(found.zstatistic) > np.sqrt(2.0) * norm.isf(_LEVEL)
     # of scatter they alternate (-2/3), of a smooth movement they do not
     alternates = np.mean(bend_x[1:] * bend_x[:-1]) < -_ALTERNATES * np.mean(bend_x**2)
     return float(np.sqrt(variance)) if clear and alternates else 0.0

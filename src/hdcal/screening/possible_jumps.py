@@ -26,6 +26,7 @@ _PROGRESS = 0.6
 # One step makes at least this share of the gap, and any other step about it at most
 # the second share of that one.
 _ONE_STEP, _OTHERS = 0.8, 0.5
+_NEAR = np.r_[1 - REACH : 0, 1:REACH]
 # A window rests that covers less than this share of what windows usually do.
 _RESTS = 0.25
 
@@ -86,14 +87,28 @@ def possible_jumps(x: np.ndarray, y: np.ndarray, scatter: float) -> np.ndarray:
     if rows.size < 2 * SIDE:
         return rows[:0]
     sides = Sides.at(x, y, rows)
-    possible = _one_way(sides, scatter)
+    possible = _one_way(sides.x, sides, scatter)
+    if scatter:
+        # The force tells the way too, and does not tremble.
+        possible |= _one_way(sides.y, sides)
     own, common = sides.gaps()
     gap = np.where(possible, _least_gap(sides, own, common), 0.0)
     usual = Usual.of(common[_elsewhere(rows, gap, possible)], resolution(y))
-    found = usual.surprised(gap, x.size) & (np.abs(gap) > _LEAST * spread(y))
+    off = _off_sequence(x, rows) | _off_sequence(y, rows)
+    # A channel that leaves its own sequence says where a jump is, if there is one.
+    found = usual.surprised(gap, x.size)
+    found |= off & usual.surprised(gap, max(int(off.sum()), 1))
+    found &= np.abs(gap) > _LEAST * spread(y)
     found &= _alike(sides, usual.scale) & _in_one_step(x, y, rows, sides, gap)
     clearest = np.argsort(-np.where(found, np.abs(gap), 0.0))
     return rows[clearest[found[clearest]]]
+
+
+def _off_sequence(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Tell before which rows a channel steps as it does nowhere else about them."""
+    steps = values[rows] - values[rows - 1]
+    off = steps - median(windows(np.diff(values, prepend=values[0]), rows, _NEAR))
+    return Usual.of(off, resolution(values)).surprised(off, values.size)
 
 
 def _elsewhere(rows: np.ndarray, gap: np.ndarray, possible: np.ndarray) -> np.ndarray:
@@ -140,10 +155,18 @@ def _reach(x: np.ndarray) -> np.ndarray:
         return np.nanmax(x, axis=1) - np.nanmin(x, axis=1)
 
 
-def _one_way(sides: Sides, scatter: float) -> np.ndarray:
-    """Tell where both sides move the same way, or rest."""
+def _one_way(
+    values: tuple[np.ndarray, np.ndarray], sides: Sides, scatter: float = 0.0
+) -> np.ndarray:
+    """Tell where both sides move the same way, or rest.
+
+    Args:
+        values: of a channel in the windows of both sides.
+        sides: of each boundary.
+        scatter: sd of the channel's reading.
+    """
     ways = []
-    for each, rests in zip(sides.x, sides.rests, strict=True):
+    for each, rests in zip(values, sides.rests, strict=True):
         steps = np.diff(each, axis=1)
         way = np.nansum(steps, axis=1)
         path = np.nansum(np.abs(steps), axis=1)
