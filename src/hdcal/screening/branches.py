@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hdcal.screening.channels import HIDDEN
+from hdcal.screening.local_fit import RESOLVED
 from hdcal.screening.result import HOLDING, LOADING, UNLOADING, StraightPart
 from hdcal.screening.run import Run
-from hdcal.screening.turning_points import turning_points
+from hdcal.screening.turning_points import noise_sd, turning_points
 
 # Rows from which on a line has a slope and scatter.
 _FEWEST = 5
@@ -91,12 +92,14 @@ def _parallel_part(
     one: Run, movements: list[tuple[np.ndarray, "Straight"]], n: int
 ) -> StraightPart | None:
     """Return what movements share of their straight parts, if these are parallel."""
-    ends = [one.x[rows[straight.rows]] for rows, straight in movements]
+    # Of a gauge that trembles a range of readings is no range of the deformation.
+    place = one.y if one.scatter else one.x
+    ends = [place[rows[straight.rows]] for rows, straight in movements]
     low, high = max(e.min() for e in ends), min(e.max() for e in ends)
     if high - low < _SHARED * max(float(np.ptp(e)) for e in ends):
         return None
     parts = [
-        rows[(one.x[rows] >= low) & (one.x[rows] <= high)] for rows, _ in movements
+        rows[(place[rows] >= low) & (place[rows] <= high)] for rows, _ in movements
     ]
     if min(part.size for part in parts) < _FEWEST:
         return None
@@ -170,8 +173,6 @@ _PIECES = 6
 # A piece within the curve has at least this many points, so that it has a slope and
 # scatter; the first and the last may be shorter, as a preload or a tare is.
 _FEWEST_POINTS = 4
-# Scatter of a mean, as a share of the distance of two of them.
-_FINE = 0.1
 # Price of one more piece: a slope, a level and a place.
 _PARAMETERS = 3.0
 # Share of a piece that is left out where it meets another one: the place of a cut is
@@ -206,12 +207,10 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
     Args:
         x: deformation of one loading, shape (n,).
         y: force, shape (n,).
-        scatter: sd of the deformation's reading, which means of rows make small.
+        scatter: sd of the deformation's reading. Lines then lie nearest to the points
+            in the noises of both channels.
     """
     points = min(_POINTS, x.size)
-    if scatter:
-        fine = _FINE * float(np.ptp(x)) * np.sqrt(x.size) / scatter
-        points = min(points, int(fine ** (2.0 / 3.0)))
     if points < 2 * _FEWEST_POINTS:
         return Straight(slice(0, x.size), True)
     edges = _edges_of(x.size, points)
@@ -219,7 +218,11 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
     span_x, span_y = np.ptp(px), np.ptp(py)
     if not span_x or not span_y:
         return Straight(slice(0, x.size), True)
-    cuts, inflation = _pieces(px - px.mean(), py - py.mean())
+    sx, sy = px - px.mean(), py - py.mean()
+    if scatter:
+        noise = max(noise_sd(y, fewest=3), RESOLVED * float(span_y))
+        sx, sy = sx / scatter, sy / noise
+    cuts, inflation = _pieces(sx, sy, both=scatter > 0.0)
     areas = [
         abs((px[b - 1] - px[a]) / span_x) * abs((py[b - 1] - py[a]) / span_y)
         for a, b in pairwise(cuts)
@@ -243,25 +246,33 @@ def _means(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return np.add.reduceat(values, edges[:-1]) / np.diff(edges)
 
 
-def _costs(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the squares left by a line through points a … b-1, shape (m+1, m+1)."""
+def _costs(x: np.ndarray, y: np.ndarray, *, both: bool) -> np.ndarray:
+    """Return the squares left by a line through points a … b-1, shape (m+1, m+1).
+
+    Args:
+        x: shape (m,).
+        y: shape (m,).
+        both: whether both scatter by the same: squares are across the line then.
+    """
     terms = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     sums = np.hstack([np.zeros((6, 1)), np.cumsum(terms, axis=1)])
     n, sx, sy, sxx, sxy, syy = sums[:, None, :] - sums[:, :, None]
     with np.errstate(all="ignore"):
         xx, xy, yy = sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n
         left = yy - np.where(xx > 0.0, xy * xy / xx, 0.0)
+        if both:
+            left = 0.5 * (xx + yy - np.hypot(xx - yy, 2.0 * xy))
     short = n < _FEWEST_POINTS
     short[0, 1:], short[1:-1, -1] = False, n[1:-1, -1] < 1
     return np.where(short, np.inf, np.maximum(left, 0.0))
 
 
-def _pieces(x: np.ndarray, y: np.ndarray) -> tuple[list[int], float]:
+def _pieces(x: np.ndarray, y: np.ndarray, *, both: bool) -> tuple[list[int], float]:
     """Return the edges of the pieces, and how much correlation widens variances.
 
     What the most pieces leave is noise; neighbours that err alike count for less.
     """
-    cost, points = _costs(x, y), x.size
+    cost, points = _costs(x, y, both=both), x.size
     best = np.full((_PIECES + 1, points + 1), np.inf)
     came = np.zeros((_PIECES + 1, points + 1), int)
     best[0, 0] = 0.0
@@ -269,7 +280,7 @@ def _pieces(x: np.ndarray, y: np.ndarray) -> tuple[list[int], float]:
         total = best[piece - 1][:, None] + cost
         came[piece] = np.argmin(total, axis=0)
         best[piece] = np.min(total, axis=0)
-    inflation = _inflation(x, y, _edges(came, points, _PIECES))
+    inflation = _inflation(x, y, _edges(came, points, _PIECES), both=both)
     left = best[1:, points]
     floor = 1e-8 * cost[0, points] + 1e-300  # digits of the readings
     worth = points / inflation
@@ -279,7 +290,7 @@ def _pieces(x: np.ndarray, y: np.ndarray) -> tuple[list[int], float]:
     criterion += paid * np.log(points) * points / np.maximum(points - paid - 1.0, 1.0)
     chosen = _edges(came, points, int(np.argmin(criterion)) + 1)
     # Fewer pieces follow less of the noise, and leave more of its memory to be seen.
-    return chosen, _inflation(x, y, chosen)
+    return chosen, _inflation(x, y, chosen, both=both)
 
 
 def _edges(came: np.ndarray, points: int, count: int) -> list[int]:
@@ -290,12 +301,12 @@ def _edges(came: np.ndarray, points: int, count: int) -> list[int]:
     return edges[::-1]
 
 
-def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int]) -> float:
+def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int], *, both: bool) -> float:
     """Return (1 + r) / (1 - r) of the neighbours' correlation r, if it is positive."""
     if x.size < _FEWEST_FOR_MEMORY:
         return 1.0
     pieces = [(a, b) for a, b in pairwise(edges) if b > a]
-    left = np.concatenate([_left(x[a:b], y[a:b]) for a, b in pieces])
+    left = np.concatenate([_left(x[a:b], y[a:b], both=both) for a, b in pieces])
     square = float(left @ left)
     r = float(left[1:] @ left[:-1]) / square if square else 0.0
     # Two parameters a piece make the residuals of independent noise alternate.
@@ -304,8 +315,11 @@ def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int]) -> float:
     return (1.0 + r) / (1.0 - r)
 
 
-def _left(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return what a line leaves of some points."""
+def _left(x: np.ndarray, y: np.ndarray, *, both: bool) -> np.ndarray:
+    """Return what a line leaves of some points; across it where both scatter."""
     x, y = x - x.mean(), y - y.mean()
+    if both:
+        across = np.linalg.svd(np.column_stack([x, y]), full_matrices=True)[2][1]
+        return across[0] * x + across[1] * y
     square = float(x @ x)
     return y - x * (float(x @ y) / square) if square else y

@@ -152,8 +152,11 @@ class Screening:
     def excluded_sense(self) -> int:
         """Sign of the movement whose rows were left out between rows that stayed.
 
-        It is that of the other branches where one alone was chosen; 0 where none was.
+        It is that of the other branches where one alone was chosen; 0 where none was,
+        and where the scatter of the deformation mixes them.
         """
+        if self.deformation_sd:
+            return 0
         x = self.deformation
         kept, left = x[self.kept], x[self.segment == OUTSIDE]
         between = (left > kept.min()) & (left < kept.max())

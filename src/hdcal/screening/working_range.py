@@ -108,7 +108,8 @@ def in_range(
     if wanted.unit == STRAIGHT and part is not None:
         inside, x = part.rows, screening.deformation
         others = screening.kept & ~inside & (x >= part.low) & (x <= part.high)
-        wanted = WorkingRange(part.low, part.high, "mm", bool(others.any()))
+        branch = bool(others.any()) and not screening.deformation_sd
+        wanted = WorkingRange(part.low, part.high, "mm", branch)
         part = None
     else:
         inside = np.zeros(run.size, bool)
