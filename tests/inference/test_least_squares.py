@@ -49,3 +49,24 @@ def test_scale_and_origin_of_both_channels_change_nothing(
     moved = stiffness(scale_x * x + shift_x, scale_y * y + shift_y)
     found = np.quantile(moved, [0.025, 0.5, 0.975]) * scale_x / scale_y
     np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))
+
+
+def test_the_order_of_rows_at_one_deformation_changes_nothing():
+    rng = np.random.default_rng(6)
+    x = np.repeat(np.linspace(0.0, 0.5, 12), 4)
+    y = 200.0 * x + rng.normal(0.0, 1.5, 48)
+    mixed = y.reshape(12, 4)[:, ::-1].ravel()
+    known, found = (
+        np.quantile(stiffness(x, values), [0.025, 0.5, 0.975]) for values in (y, mixed)
+    )
+    np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))
+
+
+def test_thinning_widens_the_interval_as_it_must():
+    """Of every fourth row the sd is twice as large, and the medians agree within it."""
+    rng = np.random.default_rng(7)
+    x = np.linspace(0.0, 0.5, 400)
+    y = 200.0 * x + rng.normal(0.0, 1.5, 400)
+    whole, thinned = stiffness(x, y), stiffness(x[::4], y[::4])
+    assert np.std(thinned) / np.std(whole) == pytest.approx(2.0, rel=0.2)
+    assert abs(np.median(thinned) - np.median(whole)) < 2.0 * np.std(thinned)

@@ -170,6 +170,33 @@ def test_the_longest_straight_part(curve, low, high):
     assert part.slope == pytest.approx(20.0, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_behind_a_gauge_that_trembles_faults_and_pieces_are_found(seed):
+    """The scatter is 8 % of the stroke, the jump 20 % of the force."""
+    rng = np.random.default_rng(seed)
+    x, rows = np.linspace(0.0, 1.0, 1000), np.arange(1000)
+    read = x + rng.normal(0.0, 0.08, 1000)
+    noise = rng.normal(0.0, 0.02, 1000)
+    found = screen(read, STIFFNESS * x + noise + 4.0 * (rows >= 600))
+    kinds = {one.kind: one for one in found.observations}
+    assert {*kinds} == {"jump of the force", "scatter of the deformation"}
+    assert kinds["jump of the force"].rows == ((600, 600),)
+    part = screen(read, STIFFNESS * np.maximum(x - 0.4, 0.0) + noise).straight
+    assert not part.whole
+    assert part.slope == pytest.approx(STIFFNESS, abs=3.0 * part.slope_sd)
+    assert part.slope_sd < 0.06 * STIFFNESS
+
+
+def test_few_rows_show_a_gauge_that_trembles_much():
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        x = np.linspace(0.0, 1.0, 60)
+        y = STIFFNESS * x + rng.normal(0.0, 0.02, 60)
+        found += screen(x + rng.normal(0.0, 0.1, 60), y).deformation_sd > 0.0
+    assert found >= 18
+
+
 def test_runs_are_screened_by_themselves():
     x, y = ramp(50)
     wild = y.copy()
