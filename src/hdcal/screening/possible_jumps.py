@@ -14,6 +14,7 @@ from hdcal.screening.local_fit import (
     spread,
     windows,
 )
+from hdcal.screening.turning_points import noise_sd
 
 # Rows needed on each side of a jump; from fewer it could be anything.
 SIDE = 4
@@ -89,8 +90,8 @@ def possible_jumps(x: np.ndarray, y: np.ndarray, scatter: float) -> np.ndarray:
     sides = Sides.at(x, y, rows)
     possible = _one_way(sides.x, sides, scatter)
     if scatter:
-        # The force tells the way too, and does not tremble.
-        possible |= _one_way(sides.y, sides)
+        # The force tells the way too, and trembles less.
+        possible |= _one_way(sides.y, sides, noise_sd(y))
     own, common = sides.gaps()
     gap = np.where(possible, _least_gap(sides, own, common), 0.0)
     usual = Usual.of(common[_elsewhere(rows, gap, possible)], resolution(y))
@@ -156,7 +157,7 @@ def _reach(x: np.ndarray) -> np.ndarray:
 
 
 def _one_way(
-    values: tuple[np.ndarray, np.ndarray], sides: Sides, scatter: float = 0.0
+    values: tuple[np.ndarray, np.ndarray], sides: Sides, scatter: float
 ) -> np.ndarray:
     """Tell where both sides move the same way, or rest.
 
