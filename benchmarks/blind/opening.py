@@ -134,8 +134,9 @@ def closable_shares(found: BlindSet, cases: Cases) -> dict[str, float]:
         if effect not in hdcal.EFFECTS or effect != label.truth[0]:
             continue
         case = hdcal.read_case(found.table(entry), found.gear)
-        clean = replace(case.records, force=np.asarray(label.clean))
-        case = replace(case, records=clean)
+        assert case.screening is not None
+        clean = np.asarray(label.clean)[case.screening.kept]
+        case = replace(case, records=replace(case.records, force=clean))
         share = closable_share(case, effect, hdcal.EFFECTS, label.sigma)
         if share is not None:
             shares[label.case] = share
