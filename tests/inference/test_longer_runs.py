@@ -12,10 +12,12 @@ from hdcal.inference import sample
 ASKED = {"chains": 2, "warmup": 300, "draws": 800}
 
 
-def case():
+def case(runs: int = 1):
     x = np.linspace(0.02, 0.54, 14)
     noise = np.random.default_rng(2).normal(0.0, 0.4, 14)
-    return make_case(make_records(x, 205.0 * x - 1.0 + noise))
+    run, known = np.arange(14) % runs, {"run"} if runs > 1 else ()
+    force = 205.0 * x - 1.0 + noise + 0.5 * run
+    return make_case(make_records(x, force, run=run, known=known))
 
 
 @pytest.fixture
@@ -31,13 +33,14 @@ def mixed(monkeypatch):
 @pytest.mark.thorough
 def test_an_extended_run_begins_with_the_same_draws(mixed):
     mixed([True])
-    short = calibrate(case(), **ASKED)
+    short = calibrate(case(runs=3), **ASKED)
     mixed([False, False, True])
-    longer = calibrate(case(), **ASKED)
+    longer = calibrate(case(runs=3), **ASKED)
     assert short.settings["draws"] == 800 and longer.settings["draws"] == 2400
-    for name in ("K", "sigma", "stiffness"):
+    # The members are integrated out, and drawn again.
+    for name in ("K", "sigma", "stiffness", "run_offset"):
         drawn = longer.tree["posterior"][name].values
-        assert drawn.shape == (2, 2400)
+        assert drawn.shape[:2] == (2, 2400)
         np.testing.assert_array_equal(
             drawn[:, :800], short.tree["posterior"][name].values
         )

@@ -10,14 +10,14 @@ Source:
     Research 25 (2024), Pareto k.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float
-from scipy.special import gammaln, softmax
+from scipy.special import logsumexp, softmax
+from scipy.stats import multivariate_t
 
 from hdcal.data.records import Array
 from hdcal.exported import jit
@@ -41,43 +41,34 @@ _MOST = 12
 _BLOCK = 500
 
 
-@dataclass(frozen=True)
-class TMixture:
-    """A mixture of multivariate t distributions of equal degrees of freedom.
+class TMixture(NamedTuple):
+    """A mixture of multivariate t distributions.
 
     Attributes:
-        share: of each component, shape (k,).
-        centre: shape (k, d).
-        root: Cholesky factor of the scale matrix, shape (k, d, d).
-        freedom: degrees of it.
+        share: of each component.
+        parts: SciPy's frozen `multivariate_t`.
     """
 
-    share: np.ndarray
-    centre: np.ndarray
-    root: np.ndarray
-    freedom: float = _FREEDOM
+    share: Sequence[float]
+    parts: Sequence[Any]
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Return places, shape (count, d)."""
-        component = rng.choice(len(self.share), count, p=self.share)
-        normal = rng.standard_normal((count, self.centre.shape[1]))
-        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
-        step = np.einsum("nij,nj->ni", self.root[component], normal)
-        return self.centre[component] + tail[:, None] * step
+        """Return places, shape (count, d), those of each component together."""
+        counts = rng.multinomial(count, self.share)
+        drawn = [
+            np.reshape(part.rvs(each, random_state=rng), (each, -1))
+            for part, each in zip(self.parts, counts, strict=True)
+            if each
+        ]
+        return np.concatenate(drawn)
 
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
-        size = place.shape[1]
-        half = 0.5 * (self.freedom + size)
-        constant = gammaln(half) - gammaln(0.5 * self.freedom)
-        constant -= 0.5 * size * np.log(np.pi * self.freedom)
-        each = []
-        for share, centre, root in zip(self.share, self.centre, self.root, strict=True):
-            square = np.sum(np.linalg.solve(root, (place - centre).T) ** 2, axis=0)
-            volume = np.sum(np.log(np.diag(root)))
-            tail = half * np.log1p(square / self.freedom)
-            each.append(np.log(share) + constant - volume - tail)
-        return np.logaddexp.reduce(each)
+        return logsumexp(
+            [part.logpdf(place) for part in self.parts],
+            axis=0,
+            b=np.reshape(self.share, (-1, 1)),
+        )
 
 
 class ImportanceDraws(NamedTuple):
@@ -158,12 +149,11 @@ def _adapted(
 
 
 def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
-    root = np.linalg.cholesky(covariance)
-    return TMixture(
-        np.array([1.0 - _WIDE_SHARE, _WIDE_SHARE]),
-        np.stack([centre, centre]),
-        np.stack([root, _WIDER * root]),
-    )
+    parts = [
+        multivariate_t(centre, scale * covariance, _FREEDOM)
+        for scale in (1.0, _WIDER**2)
+    ]
+    return TMixture((1.0 - _WIDE_SHARE, _WIDE_SHARE), parts)
 
 
 def _weights(

@@ -95,10 +95,8 @@ def sample(
     for target in longer:
         run = begin(target)
         run.advance(draws, stop_if_diverging=True)
-        if not run.diverged:
-            extended = _extended(run, draws)
-            if not extended.diverging.any():
-                return extended
+        if not run.diverged and not (found := _extended(run, draws)).diverging.any():
+            return found
     run = begin(shortest)
     run.advance(draws)
     return _extended(run, draws)
@@ -146,6 +144,7 @@ class _Run:
             for chain in range(chains)
         ]
         self._done, self._kept = 0, []
+        self._named, self._values = 0, []
 
     def advance(self, draws: int, *, stop_if_diverging: bool = False) -> None:
         """Draw so many more from each chain, after its warm-up.
@@ -182,8 +181,14 @@ class _Run:
         """Return the draws so far, with their parameters by name."""
         parts = zip(*self._kept, strict=True)
         standard, *statistics = (np.concatenate(part, axis=1) for part in parts)
-        values = _constrain(*self._arguments, standard, self._seed)
-        named = {name: np.asarray(value) for name, value in values.items()}
+        new = standard[:, self._named :]
+        named = _constrain(*self._arguments, new, self._seed, self._named)
+        self._values.append(jax.device_get(named))
+        self._named = standard.shape[1]
+        named = {
+            name: np.concatenate([part[name] for part in self._values], axis=1)
+            for name in named
+        }
         return Draws(named, *statistics, target_acceptance=self._target)
 
 
@@ -230,15 +235,28 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 
 @jit
-def _constrain(problem, whitening, standard, seed):
-    """Return parameters by name, members that were integrated out drawn again."""
+def _constrain(problem, whitening, standard, seed, first):
+    """Return parameters by name, members that were integrated out drawn again.
+
+    Args:
+        problem: the inference problem.
+        whitening: coordinates of the sampler.
+        standard: draws in these coordinates, (chain, draw, d).
+        seed: of the run.
+        first: number of draws of each chain before these.
+    """
     _, own = jax.random.split(jax.random.key(seed))
-    keys = jax.random.split(own, standard.shape[:2])
+    place = first + jnp.arange(standard.shape[1])
 
     def one(drawn):
         coordinates, key = drawn
         named = values_at(problem, whitening.position(coordinates))
         return named | draw_members(problem, named, key)
 
-    # One draw after the other: side by side members by the thousand fill the memory.
-    return jax.vmap(partial(jax.lax.map, one))((standard, keys))
+    def chain(coordinates, key):
+        # The key of a draw does not depend on the length of the run.
+        keys = jax.vmap(partial(jax.random.fold_in, key))(place)
+        # One draw after the other: members by the thousand would fill the memory.
+        return jax.lax.map(one, (coordinates, keys))
+
+    return jax.vmap(chain)(standard, jax.random.split(own, len(standard)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import root_scalar
 from scipy.special import softmax
+from scipy.stats import multivariate_t
 
 from hdcal.inference.importance import TMixture
 
@@ -39,10 +40,11 @@ class SamplingLaws:
             count: of the points.
             rng: source of randomness.
         """
-        centres, shapes = zip(*self.places, strict=True)
-        roots = [_SPREAD * np.linalg.cholesky(_wide(shape)) for shape in shapes]
-        even = np.full(len(centres), 1.0 / len(centres))
-        law = TMixture(even, np.stack(centres), np.stack(roots), _FREE)
+        laws = [
+            multivariate_t(centre, _SPREAD**2 * _wide(shape), _FREE)
+            for centre, shape in self.places
+        ]
+        law = TMixture([1.0 / len(laws)] * len(laws), laws)
         points = rng.normal(size=(count, len(self.counts)))
         log_law = -0.5 * np.sum(points[:, ~self.counts] ** 2, axis=1)
         points[:, self.counts] = law.draw(count, rng)
