@@ -22,7 +22,7 @@ from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.calibration.calibration import summarise
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
-from hdcal.inference.density import log_likelihood
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.marginal import draw_members
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem

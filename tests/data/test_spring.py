@@ -12,8 +12,7 @@ from hdcal.data.gear import NO_MATERIAL, at_full_scale, read_gear
 from hdcal.data.priors import material_priors, rig_priors
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
-from hdcal.inference.case_json import describe_case, restore_case
-from hdcal.inference.posterior_tree import data_groups
+from hdcal.inference.posterior_tree import data_groups, describe_case, restore_case
 from hdcal.inference.problem import build_problem, influence_prior
 
 SPRING = '[gear]\ntheory = "spring"\n'

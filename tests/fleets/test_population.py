@@ -13,7 +13,7 @@ from hdcal.fleets.population_problem import (
     draw_gears,
     gear_law,
 )
-from hdcal.inference.density import log_likelihood
+from hdcal.inference.likelihood import log_likelihood
 
 # Nats by which four nodes may differ from a fine grid.
 _CLOSE = 0.02

@@ -143,16 +143,16 @@ def test_a_broken_posterior_is_caught(fault):
 @pytest.mark.thorough
 def test_a_broken_likelihood_is_caught(monkeypatch):
     """The same run on a model that believes a tenth of the noise it has."""
-    from hdcal.inference import density
+    from hdcal.inference import likelihood
 
-    honest = density.linear_part
+    honest = likelihood.linear_part
 
     def overconfident(problem, values):
         return honest(problem, {**values, "sigma": 0.3 * values["sigma"]})
 
     run_sbc.cache_clear()
     jax.clear_caches()
-    monkeypatch.setattr(density, "linear_part", overconfident)
+    monkeypatch.setattr(likelihood, "linear_part", overconfident)
     ranks, _ = run_sbc.__wrapped__("base", FEW)
     jax.clear_caches()
     assert uniformity([r["sigma"] for r in ranks]) < LEVEL

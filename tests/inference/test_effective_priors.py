@@ -18,8 +18,8 @@ from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference import laplace
 from hdcal.inference.assembly import assemble
 from hdcal.inference.checks import conflict_check
-from hdcal.inference.density import log_prior
 from hdcal.inference.distributions import effective_priors
+from hdcal.inference.likelihood import log_prior
 from hdcal.inference.marginal import draw_members
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.problem import build_problem, problem_priors

@@ -20,9 +20,9 @@ from hdcal.data.gear_file.certificates import (
     certificate_priors,
 )
 from hdcal.data.priors import effect_priors
-from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import with_gains
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sampled_problem import model

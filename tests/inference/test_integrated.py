@@ -19,7 +19,7 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.errors import InputError
-from hdcal.inference import compression, density, marginal
+from hdcal.inference import compression, likelihood, marginal
 from hdcal.inference import values as of_draw
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.linear_gaussian import Grouped, Linear, contrasts
@@ -35,9 +35,9 @@ from hdcal.physics.chain import (
 )
 
 SHIPPED = effect_priors()
-log_likelihood = jax.jit(density.log_likelihood)
+log_likelihood = jax.jit(likelihood.log_likelihood)
 predict_rows = jax.jit(of_draw.predict_rows)
-pointwise = jax.jit(density.pointwise_log_likelihood)
+pointwise = jax.jit(likelihood.pointwise_log_likelihood)
 
 
 def labelled(loading, seed, *, known, runs=1, specimens=1, sds=(0.0,)):

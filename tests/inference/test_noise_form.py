@@ -15,7 +15,7 @@ from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference import model
 from hdcal.inference import noise_form as noise_form_module
 from hdcal.inference.checks import correlation_check, growth_check
-from hdcal.inference.density import log_likelihood
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.noise_form import growth_p_value, noise_grows, pilot_fit
 from hdcal.inference.problem import build_problem
 from hdcal.inference.residuals import misfits

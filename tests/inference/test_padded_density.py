@@ -11,7 +11,7 @@ from slices import slice_of
 from structures import form_of
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference import compression, density
+from hdcal.inference import compression, likelihood
 from hdcal.inference.identifiability import linearise
 from hdcal.inference.marginal import draw_members
 from hdcal.inference.padding import bucket_size
@@ -24,7 +24,7 @@ from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.
 CLOSE = {"rtol": 1e-11, "atol": 1e-12}
-EXPAND = jax.jit(jax.value_and_grad(density.log_likelihood, argnums=1))
+EXPAND = jax.jit(jax.value_and_grad(likelihood.log_likelihood, argnums=1))
 DRAW = jax.jit(draw_members)
 MOVE = jax.jit(predict_motion)
 STAGES = ("deformation", "force", "sensor", "noise")

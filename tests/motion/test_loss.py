@@ -13,8 +13,8 @@ from moving import TRUTH, frictional_case, motion, moving_case, moving_gear
 from hdcal import InputError, Prior, calibrate_dynamic, respond
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
-from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution, frozen
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model_average import load_models
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.motion import loss

@@ -12,7 +12,7 @@ import numpy as np
 from jax.scipy.special import ndtr, ndtri
 from scipy import optimize, stats
 
-from hdcal.inference.density import log_likelihood
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.problem import Problem
 
 BASE = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")

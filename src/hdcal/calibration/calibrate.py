@@ -235,9 +235,6 @@ def _specifics(
     shown: bool,
 ) -> Specifics:
     """Return what the model of the force adds to what every calibration has."""
-    centre = {
-        name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
-    }
     sigma, rows = found.values["sigma"], len(case.records.force)
     line_checks = []
     if plain:
@@ -246,7 +243,7 @@ def _specifics(
         line_checks += [straight_check(case, stiffness)]
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
-        sensitivities=linearise(problem, centre, case.records).sensitivities(),
+        sensitivities=linearise(problem, found.median, case.records).sensitivities(),
         mixed=_other_quantities(problem, found),
         checks=_said(
             case,

@@ -23,7 +23,7 @@ from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
 from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
-from hdcal.inference.density import log_likelihood
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 

@@ -19,11 +19,11 @@ from hdcal.inference.checks import (
     identification_checks,
     sampling_checks,
 )
-from hdcal.inference.density import densities, pointwise_log_likelihood
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.identifiability import unidentified
+from hdcal.inference.likelihood import densities, pointwise_log_likelihood
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior_tree import data_groups, dataset, units_in
 from hdcal.inference.problem import Problem
@@ -51,10 +51,9 @@ class Specifics:
     """Results of one kind of calibration that `assemble` takes over.
 
     Attributes:
-        log_likelihood: by observed column, (chain, draw, row), or the total of all
-            rows under `TOTAL`, (chain, draw).
+        log_likelihood: by observed column, (chain, draw, row); none for many rows.
         sensitivities: of the mean reading to each parameter, in noise sds.
-        mixed: what else must have mixed, (chain, draw) each.
+        mixed: further quantities whose chains must have mixed, (chain, draw) each.
         checks: further ones.
         observed: columns of the records that the model explains.
     """
@@ -84,17 +83,17 @@ def assemble(
         own: of this kind of calibration.
         seed: of the prior draws.
     """
-    values, weights = draws.values, densities(problem, draws.values)
-    centre = {name: np.median(v, axis=(0, 1)) for name, v in values.items()}
+    values = draws.values
+    log_prior, log_likelihood = map(np.asarray, densities(problem, values))
     # Draws are compared with the priors given how the mountings differ.
-    problem = replace(problem, priors=problem.priors_given(centre))
+    problem = replace(problem, priors=problem.priors_given(draws.median))
     sampled = {
         name: problem.priors[name]
         for name, prior in priors.items()
         if name in values and prior.family != "fixed"
     }
     scalars = {name: values[name] for name in sampled}
-    diagnoses = diagnose_parameters(scalars, sampled, *weights)
+    diagnoses = diagnose_parameters(scalars, sampled, log_prior, log_likelihood)
     rng = np.random.default_rng(seed)
     prior_draws = {
         name: sample_prior(prior, name, rng, _PRIOR_DRAWS)[None]
@@ -108,9 +107,9 @@ def assemble(
         "prior": dataset(prior_draws, units=units),
         "sample_stats": dataset(_statistics(draws)),
         **data_groups(case.records, own.observed, case.units),
-        "log_likelihood": dataset(own.log_likelihood),
+        "log_likelihood": dataset(own.log_likelihood or {TOTAL: log_likelihood}),
     }
-    if TOTAL in own.log_likelihood:
+    if not own.log_likelihood:
         groups["log_likelihood"][TOTAL].attrs["comment"] = (
             "log likelihood of all rows, runs, specimens and gap integrated out where "
             "they were; values by row are not kept for so many rows"
@@ -141,16 +140,10 @@ def _statistics(draws: Draws) -> dict[str, np.ndarray]:
 def force_log_likelihood(
     case: Case, problem: Problem, draws: Draws
 ) -> dict[str, np.ndarray]:
-    """Return the log likelihood of each row and draw, or the totals if they are many.
-
-    Args:
-        case: data and gear.
-        problem: what was sampled.
-        draws: from the sampler.
-    """
+    """Return the log likelihood of each row and draw; nothing if they are many."""
     rows = len(case.records.force)
     if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
-        return {TOTAL: densities(problem, draws.values)[1]}
+        return {}
     padded = pad_records(case.records)
     columns = discrepancy_columns(problem.discrepancy, padded)
     before = np.full(len(padded.force), -1)

@@ -17,7 +17,6 @@ from hdcal.inference.sample import MAX_TREE_DEPTH, Draws
 from hdcal.inference.serial_correlation import CORRELATION, worth
 
 INDEPENDENT = "neighbouring readings err independently"
-# Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
 NOISY = "the noise is what such rigs have"
 MIN_BFMI = 0.3
@@ -26,13 +25,12 @@ MAX_SATURATED = 0.01
 COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
-# Nothing of these is an ordinary answer, not a bound that is in the way.
+# Parameters that are ordinarily zero: that is no bound that cuts an answer off.
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation that is reported where it is larger with 95 % probability [-].
 _REPORTED_CORRELATION = 0.1
-# Of readings with so strong a correlation that are worth fewer than so many independent
-# ones intervals are too narrow: the prior expects less
-# (tests/inference/test_correlation_prior.py).
+# A correlation from which intervals are too narrow where readings are worth fewer than
+# so many independent ones (tests/inference/test_correlation_prior.py).
 _STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 26.0
 
 
@@ -51,12 +49,16 @@ class Check:
     words: str
 
 
+def _check(name: str, passed: bool, words: str) -> Check:
+    return Check(name, "passed" if passed else "failed", words)
+
+
 def sampling_checks(draws: Draws, mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
     """Return the checks on the sampler: any of them failed fails the result.
 
     Args:
         draws: from the sampler.
-        mixed: by quantity.
+        mixed: convergence by quantity.
     """
     from arviz_stats.base.array import array_stats
 
@@ -87,12 +89,7 @@ def sampling_checks(draws: Draws, mixed: Mapping[str, Mixing]) -> tuple[Check, .
 
 
 def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]:
-    """Return the checks on chains of any sampler.
-
-    Args:
-        mixed: by quantity.
-        chains: how many.
-    """
+    """Return the checks on the convergence of each quantity, for any sampler."""
     # Constant or infinite draws give NaN, which counts as the worst.
     rhat = {n: np.nan_to_num(one.rhat, nan=np.inf) for n, one in mixed.items()}
     size = {
@@ -116,20 +113,10 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
     )
 
 
-def _check(name: str, passed: bool, words: str) -> Check:
-    return Check(name, "passed" if passed else "failed", words)
-
-
 def correlation_check(
     draws: Mapping[str, np.ndarray], rows: int, reason: str = ""
 ) -> Check:
-    """Report the correlation of neighbouring readings, or why none is in the model.
-
-    Args:
-        draws: by parameter.
-        rows: number of readings.
-        reason: why no correlation is in the model, from `why_independent`.
-    """
+    """Report the correlation of neighbouring readings, or the reason for none."""
     if CORRELATION not in draws:
         words = f"a correlation of neighbours is not inferred for these data: {reason}"
         return Check(INDEPENDENT, "note", words)
@@ -151,28 +138,22 @@ def correlation_check(
 
 
 def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
-    """Report noise that grows with the force.
-
-    Args:
-        draws: by parameter.
-        unasked: whether it is in the model because the readings show it.
-    """
+    """Report noise that grows with the force, asked for or in the model unasked."""
     name = "readings scatter alike at any {load}"
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
     words = (
         f"readings scatter by {np.median(share):.1%} of the {{load}}, beside σ at no "
-        "{load}"
+        "{load}; every interval allows for it"
     )
-    words += "; every interval allows for it"
     if unasked:
         words += ". --constant-noise, or adapt_noise=False, keeps it of one size"
     return Check(name, "note", words)
 
 
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
-    """Fail a result whose noise is too small for Sheppard's correction.
+    """Fail a result whose noise [N] is too small for Sheppard's correction.
 
     Args:
         step: rounding step [N].
@@ -180,52 +161,46 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
         sigma: draws of the noise sd [N].
     """
     limit = COARSEST_STEP * float(np.median(sigma))
-    exact = "exact" if rounded else "by Sheppard's correction"
-    return _check(
-        "rounding is treated rightly",
-        rounded or step <= limit,
-        f"step {step:g} {{N}}, {exact}"
-        + ("" if rounded else f"; that holds up to {limit:.3g} {{N}}"),
-    )
+    how = f"by Sheppard's correction; that holds up to {limit:.3g} {{N}}"
+    words = f"step {step:g} {{N}}, {'exact' if rounded else how}"
+    return _check("rounding is treated rightly", rounded or step <= limit, words)
 
 
 def conflict_check(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> Check:
     """Warn of posteriors that lie far out in the tails of their priors."""
-    far = {}
+    far, above = {}, {}
     for parameter, values in draws.items():
-        prior, median = frozen(priors[parameter], parameter), float(np.median(values))
+        stated = priors[parameter]
+        prior, median = frozen(stated, parameter), float(np.median(values))
         # A density that is highest at zero, as of an effect, expects a zero.
-        below = np.inf if _peaks_at_zero(priors[parameter]) else prior.cdf(median)
+        peaks_at_zero = stated.family == "half_normal" or (
+            stated.family == "beta" and float(stated.numbers[0]) <= 1.0
+        )
+        below = np.inf if peaks_at_zero else prior.cdf(median)
         if 2.0 * min(below, prior.sf(median)) < CONFLICT_TAIL:
             low, high = prior.interval(1.0 - CONFLICT_TAIL)
             far[parameter] = f"{median:.3g}, expected {low:.3g} to {high:.3g}"
+            above[parameter] = median > prior.median()
     if not far:
         return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
-    each = [f"{name} = {about}" for name, about in far.items()]
-    words = f"far outside what was expected before the data: {listed(each)}"
-    noise = {*far} <= {"sigma", CORRELATION}
-    if noise and all(_above(name, draws, priors) for name in far):
+    if {*far} <= {"sigma", CORRELATION} and all(above.values()):
         # A wrong unit shows in the stiffness too.
+        name = NOISY
         remedy = "A loop, a bend or a drift that the model lacks counts as noise here"
-        return Check(NOISY, "warning", f"{words}. {remedy}")
-    # A wrong unit shows in more than in parameters of effects.
-    if all("." in name for name in far):
+    elif all("." in parameter for parameter in far):
+        # A wrong unit shows in more than in parameters of effects.
+        name = "prior and effects agree"
         remedy = "Where the rig explains it, give it a prior of its own"
-        return Check("prior and effects agree", "warning", f"{words}. {remedy}")
-    remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
-    return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
-
-
-def _above(name: str, draws: Mapping, priors: Mapping[str, Prior]) -> bool:
-    return float(np.median(draws[name])) > frozen(priors[name], name).median()
-
-
-def _peaks_at_zero(prior: Prior) -> bool:
-    if prior.family == "beta":
-        return float(prior.numbers[0]) <= 1.0
-    return prior.family == "half_normal"
+    else:
+        name = PLAUSIBLE
+        remedy = (
+            "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
+        )
+    each = listed([f"{parameter} = {words}" for parameter, words in far.items()])
+    words = f"far outside what was expected before the data: {each}. {remedy}"
+    return Check(name, "warning", words)
 
 
 def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) -> Check:
@@ -237,8 +212,7 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
             continue
         low, high = frozen(priors[parameter], parameter).support()
         flat = values.reshape(-1)
-        ends = ((low, flat - low), (high, high - flat))
-        for end, distance in ends:
+        for end, distance in ((low, flat - low), (high, high - flat)):
             # A density that does not fall towards the end leaves a tenth of its
             # 95 % reach a share of at least a tenth; an inner one leaves none.
             reach = np.quantile(distance, 0.95) if np.isfinite(end) else 0.0
@@ -246,12 +220,8 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
                 piled.append(f"{parameter} at {end:g}")
     if not piled:
         return Check(name, "passed", "every posterior lies inside its prior's range")
-    return Check(
-        name,
-        "warning",
-        f"{listed(piled)}: an effect at zero is not needed by these data, any other "
-        "bound cuts the answer off",
-    )
+    words = "an effect at zero is not needed by these data, any other bound cuts the "
+    return Check(name, "warning", f"{listed(piled)}: {words}answer off")
 
 
 def listed(names: list[str]) -> str:

@@ -30,11 +30,11 @@ class CompressedRows(eqx.Module):
         factor: R of [X y]; before `whitened`, of rows that follow no other one.
         count: number of rows [-].
         known_sd: stated measurement sd [N].
-        sd_before: stated measurement sd of the row before, where there is one [N].
+        sd_before: stated measurement sd of the row before, if there is one [N].
         run: run index.
         specimen: specimen index.
-        pairs: R of [X y X' y'] with X' and y' those of the row before, or None
-            where neighbours are not correlated.
+        pairs: R of [X y X' y'] with X' and y' of the row before, or None where
+            neighbours are not correlated.
         following: number of rows that follow another one [-].
     """
 
@@ -48,23 +48,18 @@ class CompressedRows(eqx.Module):
     following: Float[Array, " g"]
 
     def variance(self, sigma, step) -> Float[Array, " g"]:
-        """Return the variance of a reading [N²].
+        """Return the variance of a reading [N²], by Sheppard's correction.
+
+        That is exact to 2 exp(−2π²σ²/step²).
 
         Args:
             sigma: noise sd before rounding [N].
-            step: rounding step [N]; Sheppard's correction adds step²/12, exact to
-                2 exp(−2π²σ²/step²).
+            step: rounding step [N].
         """
         return sigma**2 + self.known_sd**2 + step**2 / 12.0
 
     def whitened(self, correlation, sigma, step) -> "CompressedRows":
-        """Return factors of rows in which the noise is independent.
-
-        Args:
-            correlation: of neighbouring rows [-].
-            sigma: noise sd before rounding [N].
-            step: rounding step [N].
-        """
+        """Return factors of rows in which the noise is independent."""
         if self.pairs is None:
             return self
         now, before = jnp.split(self.pairs, 2, axis=-1)
@@ -94,18 +89,16 @@ def keep_or_compress(
     padded, count = pad_records(records), len(records.force)
     columns = discrepancy_columns(discrepancy, padded)
     before = previous_rows(records) if correlated else None
-    design = base_columns
-    if columns is not None:
-        design = np.hstack([base_columns, columns[:count]])
+    shapes = np.empty((count, 0)) if columns is None else columns[:count]
+    design = np.hstack([base_columns, shapes])
     blocks = None if keep else compress_if_smaller(records, design, before)
-    if blocks is not None:
-        kept = {"blocks": blocks, "records": None, "columns": None, "before": None}
-    else:
+    kept: dict[str, Any] = dict.fromkeys(("records", "columns", "before"))
+    if blocks is None:
         if before is not None:
             padding = (0, len(padded.force) - count)
             before = np.pad(before, padding, constant_values=-1)
-        kept = {"blocks": None, "records": padded, "columns": columns, "before": before}
-    return kept | {"count": count}
+        kept = {"records": padded, "columns": columns, "before": before}
+    return {**kept, "blocks": blocks, "count": count}
 
 
 def compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
@@ -132,6 +125,8 @@ def group_rows(run, specimen, *known_sd) -> tuple[np.ndarray, np.ndarray]:
 def compress(columns, force, distinct, group, before=None) -> CompressedRows:
     """Reduce rows to one triangular factor per group, or two.
 
+    Where groups differ in a stated sd, groups of no rows fill up a bucket.
+
     Args:
         columns: X, shape (n, p).
         force: readings y [N], shape (n,).
@@ -140,10 +135,6 @@ def compress(columns, force, distinct, group, before=None) -> CompressedRows:
         group: group index of each row, shape (n,).
         before: index of the row before each, −1 for none; None where neighbours are
             not correlated.
-
-    Returns:
-        The factors of each group. Where a stated sd tells rows apart, their number is
-        any number: groups of no rows then fill up the bucket.
     """
     table, size = np.column_stack([columns, force]), len(distinct)
     alone, pairs = np.full(len(group), True), None

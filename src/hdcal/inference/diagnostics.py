@@ -59,20 +59,20 @@ class Diagnosis(Mixing):
 
 def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
     """Return the convergence of each quantity, (chain, draw) each."""
-    return {name: _mixing(np.asarray(values, float)) for name, values in draws.items()}
-
-
-def _mixing(values: np.ndarray) -> Mixing:
     # Importing arviz-stats takes a second.
     from arviz_stats.base.array import array_stats
 
+    found = {}
     with np.errstate(all="ignore"):
-        numbers = (
-            array_stats.rhat(values),
-            array_stats.ess(values),
-            array_stats.ess(values, method="tail", prob=_TAIL),
-        )
-    return Mixing(*(np.asarray(number).item() for number in numbers))
+        for name, values in draws.items():
+            values = np.asarray(values, float)
+            numbers = (
+                array_stats.rhat(values),
+                array_stats.ess(values),
+                array_stats.ess(values, method="tail", prob=_TAIL),
+            )
+            found[name] = Mixing(*(np.asarray(number).item() for number in numbers))
+    return found
 
 
 def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
@@ -109,11 +109,11 @@ def diagnose_parameters(
     log_prior: np.ndarray,
     log_likelihood: np.ndarray,
 ) -> dict[str, Diagnosis]:
-    """Return the sampling quality and the driver of each parameter.
+    """Return the convergence of each scalar parameter, and what decides it.
 
     Args:
-        draws: scalar parameters, each (chain, draw).
-        priors: prior of each parameter.
+        draws: of each parameter, (chain, draw).
+        priors: of each parameter.
         log_prior: of each draw.
         log_likelihood: of each draw, all data.
     """
@@ -149,13 +149,13 @@ def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
 def power_sensitivity(
     draws: Mapping[str, np.ndarray], log_part: np.ndarray
 ) -> dict[str, float]:
-    """Return how much each parameter changes with the power of a part of its density.
+    """Return how much each parameter changes with the power of prior or likelihood.
 
     The weights are not Pareto-smoothed: so near to one they have no tail.
 
     Args:
         draws: of each parameter, (chain, draw).
-        log_part: log density of prior or likelihood of each draw.
+        log_part: log prior or log likelihood of each draw.
     """
     from arviz_stats.base.array import array_stats
 

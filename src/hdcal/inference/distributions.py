@@ -17,14 +17,10 @@ POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma
 
 
 def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
-    """Return the NumPyro distribution of a prior that is not fixed.
-
-    Args:
-        prior: family and numbers.
-        name: of the parameter.
+    """Return the NumPyro distribution of the prior of a parameter.
 
     Raises:
-        ValueError: the family has none.
+        ValueError: the family has none, such as a fixed value.
     """
     import numpyro.distributions as dist
 
@@ -46,14 +42,10 @@ def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
 
 
 def frozen(prior: Prior, name: str = "") -> Any:
-    """Return the SciPy distribution of a prior that is not fixed.
-
-    Args:
-        prior: family and numbers.
-        name: of the parameter.
+    """Return the SciPy distribution of the prior of a parameter.
 
     Raises:
-        ValueError: the family has none.
+        ValueError: the family has none, such as a fixed value.
     """
     from scipy import stats
 
@@ -75,29 +67,17 @@ def frozen(prior: Prior, name: str = "") -> Any:
 
 
 def moments(prior: Prior, name: str = "") -> tuple[float, float]:
-    """Return mean and sd of a prior, in its own unit.
-
-    Args:
-        prior: family and numbers; the sd of a fixed one is 0.
-        name: of the parameter.
-    """
+    """Return mean and sd of the prior of a parameter; the sd of a fixed one is 0."""
     if prior.family == "fixed":
         return float(prior.numbers[0]), 0.0
-    scipy_prior: Any = frozen(prior, name)
+    scipy_prior = frozen(prior, name)
     return float(scipy_prior.mean()), float(scipy_prior.std())
 
 
 def sample_prior(
     prior: Prior, name: str, rng: np.random.Generator, count: int
 ) -> np.ndarray:
-    """Return draws of a parameter from its prior, shape (count,).
-
-    Args:
-        prior: family and numbers, possibly fixed.
-        name: of the parameter.
-        rng: source of randomness.
-        count: number of draws.
-    """
+    """Return draws of a parameter from its prior, possibly fixed, shape (count,)."""
     if prior.family == "fixed":
         return np.full(count, float(prior.numbers[0]))
     return np.asarray(frozen(prior, name).ppf(rng.random(count)))

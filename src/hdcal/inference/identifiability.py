@@ -11,8 +11,9 @@ from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import listed
-from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
+from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen, moments
+from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
@@ -36,9 +37,9 @@ class Linearisation:
         sd: of the noise, rounding included [N], shape (n,).
         slopes: derivatives by parameter [N per unit of the parameter], shape (n,).
         members: contribution of each run, specimen and weight of the discrepancy per
-            prior sd of its own [N], shape (n, m). Members by the hundred are left
-            out: one by one none of them matters.
-        place: where the members stand, in prior sds, shape (m,).
+            prior sd [N], shape (n, m). Runs or specimens by the hundred are left out:
+            one of them matters little.
+        place: values of the members, in prior sds, shape (m,).
     """
 
     sd: np.ndarray
@@ -47,74 +48,51 @@ class Linearisation:
     place: np.ndarray
 
     def sensitivities(self) -> dict[str, np.ndarray]:
-        """Return the slopes in noise sds, less what the members can take up.
+        """Return the slopes in noise sds, less what the members can explain.
 
         The squared length of each is the information on its parameter with the members
         integrated out, their unit priors included.
         """
         members = self.members / self.sd[:, None]
+        columns = (np.reshape([*self.slopes.values()], (-1, len(self.sd))) / self.sd).T
         products = np.eye(members.shape[1]) + members.T @ members
-        columns = {name: slope / self.sd for name, slope in self.slopes.items()}
-        taken = {
-            name: np.linalg.solve(products, members.T @ column)
-            for name, column in columns.items()
-        }
-        return {
-            name: np.concatenate([column - members @ taken[name], -taken[name]])
-            for name, column in columns.items()
-        }
+        taken = np.linalg.solve(products, members.T @ columns)
+        left = np.concatenate([columns - members @ taken, -taken])
+        return dict(zip(self.slopes, left.T, strict=True))
 
 
 def linearise(
     problem: Problem, values: Mapping[str, np.ndarray], records: Records
 ) -> Linearisation:
-    """Linearise the mean reading of the measured rows.
-
-    Args:
-        problem: structure.
-        values: one set of parameters, in code units.
-        records: the rows, not padded.
-    """
+    """Linearise the mean reading of rows, not padded, near one set of parameters."""
     rows, padded = len(records.force), pad_records(records)
     columns = discrepancy_columns(problem.discrepancy, padded)
-    names = _free_parameters(problem, values)
+    of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
+    names = tuple(
+        name
+        for name in (*_MEAN, *(n for n in values if n.partition(".")[0] in of_mean))
+        if name in values and problem.priors[name].family != "fixed"
+    )
     parts = _derivatives(problem, values, padded, columns, names=names)
     sd, slopes, stiffening = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
     members, place = [np.zeros((rows, 0))], [np.zeros(0)]
-    if 0 < problem.runs <= _MOST_MEMBERS:
-        scale = values["run_offset_sd"]
-        # Deviations from the mean of the tested ones, which is the zero itself.
-        is_own = records.run[:, None] == np.arange(problem.runs)
-        members.append(scale * (is_own - 1.0 / problem.runs))
-        place.append(values["run_offset"] / scale)
-    if 0 < problem.specimens <= _MOST_MEMBERS:
-        scale = values["specimen_sd"]
-        is_own = records.specimen[:, None] == np.arange(problem.specimens)
-        from_mean = is_own - 1.0 / problem.specimens
-        members.append(scale * stiffening[:, None] * from_mean)
-        place.append(values["specimen_deviation"] / scale)
-    if columns is not None:
+    for kind, count, size in (
+        ("run", problem.runs, np.ones(rows)),
+        ("specimen", problem.specimens, stiffening),
+    ):
+        if 0 < count <= _MOST_MEMBERS:
+            scale = values[MEMBER_SD[kind]]
+            # Members are deviations from the mean of the tested ones.
+            labelled = getattr(records, kind)[:, None] == np.arange(count)
+            members.append(scale * size[:, None] * (labelled - 1.0 / count))
+            place.append(values[MEMBERS[kind]] / scale)
+    if problem.discrepancy is not None and columns is not None:
         sizes = values["gap_sd"], values["gap_length"]
-        scale = np.asarray(_prior_sd(problem.discrepancy, *sizes))
+        scale = np.asarray(problem.discrepancy.prior_sd(*sizes))
         members.append(columns[:rows] * scale)
         place.append(values["gap_weights"] / scale)
-    return Linearisation(
-        np.sqrt(sd**2 + problem.step**2 / 12.0),
-        slopes,
-        np.concatenate(members, axis=1),
-        np.concatenate(place),
-    )
-
-
-def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
-    """Return the parameters of the mean that are not fixed."""
-    of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
-    sizes = [name for name in values if name.partition(".")[0] in of_mean]
-    return tuple(
-        name
-        for name in (*_MEAN, *sizes)
-        if name in values and problem.priors[name].family != "fixed"
-    )
+    sd = np.sqrt(sd**2 + problem.step**2 / 12.0)
+    return Linearisation(sd, slopes, np.hstack(members), np.concatenate(place))
 
 
 @jit(static_argnames=("names",))
@@ -161,9 +139,10 @@ def resolved_units(
             else:
                 fixed = prior.family == "fixed"
                 values[name] = prior.numbers[0] if fixed else frozen(prior).median()
-    padded, names = pad_records(records), tuple(problem.units)
-    _, slopes, _ = _derivatives(problem, values, padded, None, names=names)
-    rows = len(base_columns)
+    names, rows = tuple(problem.units), len(base_columns)
+    _, slopes, _ = _derivatives(
+        problem, values, pad_records(records), None, names=names
+    )
     return {
         name: standard_error(
             np.asarray(slopes[name])[:rows], base_columns, noise_sd, widest
@@ -188,11 +167,6 @@ def standard_error(
     return min(most, noise_sd / length) if length > 0.0 and noise_sd > 0.0 else most
 
 
-@jit
-def _prior_sd(discrepancy: Discrepancy, sd, length):
-    return discrepancy.prior_sd(sd, length)
-
-
 def unidentified(
     sensitivities: Mapping[str, np.ndarray], problem: Sampled
 ) -> tuple[list[str], list[str]]:
@@ -212,9 +186,10 @@ def unidentified(
     }
     length = {name: float(np.linalg.norm(column)) for name, column in scaled.items()}
     without_effect = [name for name in scaled if length[name] < _NO_EFFECT]
-    weak = [name for name in scaled if _NO_EFFECT <= length[name] < 1.0]
     sentences = [
-        f"{name} is hardly seen by this data; its prior is the answer" for name in weak
+        f"{name} is hardly seen by this data; its prior is the answer"
+        for name in scaled
+        if _NO_EFFECT <= length[name] < 1.0
     ]
     strong = {name: column for name, column in scaled.items() if length[name] >= 1.0}
     if len(strong) > 1:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp, softmax
+from scipy.special import softmax
 from scipy.stats import multivariate_t
 
 from hdcal.data.records import Array
@@ -56,19 +56,32 @@ class TMixture(NamedTuple):
         """Return places, shape (count, d), those of each component together."""
         counts = rng.multinomial(count, self.share)
         drawn = [
-            np.reshape(part.rvs(each, random_state=rng), (each, -1))
-            for part, each in zip(self.parts, counts, strict=True)
-            if each
+            np.reshape(part.rvs(size, random_state=rng), (size, -1))
+            for part, size in zip(self.parts, counts, strict=True)
+            if size
         ]
         return np.concatenate(drawn)
 
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
-        return logsumexp(
-            [part.logpdf(place) for part in self.parts],
-            axis=0,
-            b=np.reshape(self.share, (-1, 1)),
-        )
+        each = [part.logpdf(place) for part in self.parts]
+        return np.logaddexp.reduce(np.log(self.share) + np.transpose(each), axis=1)
+
+
+def t_mixture(
+    share: Sequence[float],
+    scales: Sequence[tuple[np.ndarray, np.ndarray]],
+    freedom: float,
+) -> TMixture:
+    """Return a mixture of multivariate t distributions of the same degrees of freedom.
+
+    Args:
+        share: of each component.
+        scales: centre and scale matrix of each.
+        freedom: degrees of it.
+    """
+    frozen: Any = multivariate_t
+    return TMixture(share, [frozen(*scale, freedom) for scale in scales])
 
 
 class ImportanceDraws(NamedTuple):
@@ -149,11 +162,8 @@ def _adapted(
 
 
 def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
-    parts = [
-        multivariate_t(centre, scale * covariance, _FREEDOM)
-        for scale in (1.0, _WIDER**2)
-    ]
-    return TMixture((1.0 - _WIDE_SHARE, _WIDE_SHARE), parts)
+    scales = [(centre, covariance), (centre, _WIDER**2 * covariance)]
+    return t_mixture((1.0 - _WIDE_SHARE, _WIDE_SHARE), scales, _FREEDOM)
 
 
 def _weights(

@@ -17,7 +17,6 @@ from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
 from hdcal.exported import jit
-from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
 
 Position = dict[str, Any]
@@ -113,10 +112,6 @@ def log_evidence(problem: Sampled, fitted: Whitening) -> float:
 
     As if the density were normal around its mode: −U + ½ d log 2π + log|factor|, U the
     potential at the mode.
-
-    Args:
-        problem: the inference problem.
-        fitted: its mode and curvature, from `fit`.
     """
     volume = np.linalg.slogdet(fitted.factor)[1]
     volume += 0.5 * len(fitted.factor) * np.log(2.0 * np.pi)
@@ -155,13 +150,7 @@ def _position(like: Position, flat) -> Position:
 
 @jit
 def _expand(problem: Sampled, like: Position, flat):
-    """Return the typical potential with its gradient and Hessian.
-
-    Args:
-        problem: the inference problem.
-        like: any position of the problem.
-        flat: where to expand, flattened.
-    """
+    """Return the typical potential with its gradient and Hessian at a flat position."""
     _, unravel = ravel_pytree(like)
     expand = jax.value_and_grad(lambda x: _typical(problem, unravel(x)))
 
@@ -176,26 +165,20 @@ def _expand(problem: Sampled, like: Position, flat):
 
 
 def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
-    """Return the potential whose minimum is a typical place, not only the mode.
+    """Return the potential whose minimum is a typical position, not only the mode.
 
     A discrepancy that is sampled can interpolate while sigma vanishes: there the
-    density is highest, in next to no volume, and a sampler that starts there stays. The
-    volume is counted in: sigma to the power of the number of its weights.
+    density is highest, in next to no volume, and a sampler that starts there stays.
+    The volume is a factor: sigma to the power of the number of weights.
     """
-    value = potential(problem, position)
-    if not isinstance(problem, Problem) or problem.discrepancy is None:
+    value, weights = potential(problem, position), problem.sampled_weights
+    if not weights:
         return value
-    if "discrepancy" in problem.integrated:
-        return value
-    sigma = values_at(problem, position)["sigma"]
-    return value - problem.discrepancy.size * jnp.log(sigma)
+    return value - weights * jnp.log(values_at(problem, position)["sigma"])
 
 
 def _stop_at_kink():
-    """Return a callback that ends a search which gains nothing more.
-
-    At a kink the gradient does not vanish.
-    """
+    """Return a callback that ends a search at a kink, where no gradient vanishes."""
     levels: list[float] = []
 
     def stop(intermediate_result: OptimizeResult) -> None:

@@ -1,4 +1,6 @@
-"""How probable a reading is, given its mean and noise, rounding included."""
+"""Likelihood of a problem's readings, and the log prior of its parameters."""
+
+from functools import partial, singledispatch
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +10,20 @@ from jax.scipy.special import logsumexp
 from jaxtyping import Float
 from scipy import special
 
-from hdcal.data.records import Array
+from hdcal.data.records import Array, Records
+from hdcal.exported import jit
+from hdcal.inference.distributions import distribution
+from hdcal.inference.marginal import linear_part
+from hdcal.inference.padding import measured
+from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import given_before
+from hdcal.inference.values import (
+    Values,
+    correlation_of,
+    predict_rows,
+    with_rounding,
+)
 from hdcal.physics.effect import Noise
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the
@@ -19,7 +34,7 @@ _FAR = -20.0
 def log_interval(low, high):
     """Return log(Φ(high) − Φ(low)) without cancellation in either tail.
 
-    By NumPy for NumPy's arrays, whose shapes are many: nothing is compiled.
+    NumPy arrays, which have many shapes, are computed by NumPy: nothing is compiled.
     """
     xp, erfc = (np, special.erfc) if isinstance(low, np.ndarray) else (jnp, jax_erfc)
     flip = low > 0.0
@@ -36,15 +51,8 @@ def log_interval(low, high):
     return power[0] + xp.log(factor[0] - factor[1] * xp.exp(power[1] - power[0]))
 
 
-def log_probability(
-    force: Float[Array, " n"],
-    mean: Float[Array, " n"],
-    noise: Noise,
-    step: float | Float[Array, ""],
-    *,
-    rounded: bool,
-) -> Float[Array, " n"]:
-    """Return the log probability of each reading.
+def log_probability(force, mean, noise: Noise, step, *, rounded: bool):
+    """Return the log probability of each reading, shape (n,).
 
     Args:
         force: as read [N].
@@ -65,7 +73,7 @@ def log_probability(
 
 
 def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]:
-    """Return the precision that each row has, as narrow a component as it is of [1/N²].
+    """Return the precision of each row [1/N²], averaged over the mixture's components.
 
     Args:
         error: reading less its mean [N].
@@ -74,3 +82,67 @@ def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]
     log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
     share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
     return jnp.sum(share / noise.sd**2, axis=0)
+
+
+def pointwise_log_likelihood(
+    problem: Problem, values: Values, records: Records, columns, before
+) -> Float[Array, " n"]:
+    """Return the log likelihood of each row given all values [log 1/N].
+
+    And given the rows before it in its run, where neighbours may be correlated.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        records: the rows.
+        columns: basis of the discrepancy at the rows, or None.
+        before: index of the row before each in its run, or None.
+    """
+    mean, noise = predict_rows(problem, values, records, columns)
+    noise = with_rounding(noise, problem.step, rounded=problem.rounded)
+    if problem.correlated:
+        (sd,), correlation = noise.sd, correlation_of(values)
+        error = (records.force - mean) / sd
+        mean, sd = given_before(mean, sd, error, before, correlation)
+        noise = Noise(noise.log_weight, sd[None])
+    return log_probability(
+        records.force, mean, noise, problem.step, rounded=problem.rounded
+    )
+
+
+@singledispatch
+def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
+    """Return the log likelihood of all data, members integrated out where they can.
+
+    Padding is left out.
+    """
+    raise NotImplementedError(type(problem).__name__)
+
+
+@log_likelihood.register
+def _(problem: Problem, values: Values) -> Float[Array, ""]:
+    if problem.integrated or problem.blocks is not None:
+        return linear_part(problem, values).log_likelihood()
+    rows = problem.rows, problem.columns, problem.before
+    each = pointwise_log_likelihood(problem, values, *rows)
+    return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
+
+
+def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
+    """Return the log prior of the named parameters, each in its own coordinate."""
+    total = jnp.zeros(())
+    for name, prior in problem.priors_given(values).items():
+        if name in values and prior.family != "fixed":
+            total = total + distribution(prior, name).log_prob(values[name])
+    return total
+
+
+@jit
+def densities(problem: Sampled, draws: Values):
+    """Return log prior and log likelihood of each draw, (chain, draw) each."""
+
+    def both(one):
+        return log_prior(problem, one), log_likelihood(problem, one)
+
+    # One draw after the other: all rows of thousands of draws would fill the memory.
+    return jax.vmap(partial(jax.lax.map, both))(draws)

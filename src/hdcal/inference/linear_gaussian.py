@@ -54,11 +54,11 @@ class _Solution(NamedTuple):
     """The scores given the rows.
 
     Attributes:
-        parts: blocks of rows whose inner products are those of [Z r] without the
-            members of `Grouped`: what these leave, these in prior sds, and their sum.
+        parts: blocks of rows with the inner products of [Z r] without the eliminated
+            members: the rows less the members, the members in prior sds, their sum.
         factor: Cholesky factor of A.
         mean: of the scores.
-        precision: of each eliminated member when the scores are known; or None.
+        precision: of each eliminated member given the scores, or None.
     """
 
     parts: Sequence[Float[Array, "_ m1"]]

@@ -20,10 +20,7 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import log_volume, whiten
 from hdcal.inference.values import (
-    CORE,
-    ONE,
     Values,
-    block_coefficients,
     correlation_of,
     member_base,
     predict_rows,
@@ -31,6 +28,8 @@ from hdcal.inference.values import (
 )
 from hdcal.physics.chain import linear_coefficients
 
+# Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
+CORE, ONE = 4, 2
 _HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -39,10 +38,10 @@ class _Rows(NamedTuple):
 
     Attributes:
         labels: rows or blocks of rows, with the index of each one's members.
-        residual: shape (r,).
-        columns: what a member of each kind adds to its rows, per unit.
+        residual: reading less mean, shape (r,).
+        columns: contribution of a unit member of each kind to its rows.
         gap: columns of the discrepancy, or None.
-        log_scale: as `Linear` has it.
+        log_scale: Σ log sd √(2π) over the measured rows.
     """
 
     labels: Any
@@ -55,9 +54,7 @@ class _Rows(NamedTuple):
 def linear_part(problem: Problem, values: Values) -> Linear:
     """Return the residual that the integrated members have to explain.
 
-    Args:
-        problem: structure and data.
-        values: parameters of one draw; integrated members among them do not count.
+    Values of integrated members, if there are any, are left out.
     """
     drawn = {MEMBERS[kind] for kind in problem.integrated}
     values = {name: value for name, value in values.items() if name not in drawn}
@@ -97,7 +94,7 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
     following = 0 if before is None else jnp.sum(before >= 0)
 
     def white(column):
-        """Return what a column is where the noise is independent and of sd 1."""
+        """Return a column where the noise is independent and of sd 1."""
         scaled = (jnp.where(real, 1.0 / sd, 0.0) * column.T).T
         return scaled if before is None else whiten(scaled, before, correlation)
 
@@ -119,8 +116,10 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     factor = blocks.factor / sd[:, None, None]
     base = member_base(problem, {**values, "force_offset": 0.0})
     slope = linear_coefficients(base, problem.reading)
-    coefficients = block_coefficients(problem, blocks, values)
-    fitted = jnp.einsum("gij,gj->gi", factor[..., :-1], coefficients)
+    of_blocks = member_base(problem, values, blocks.run, blocks.specimen)
+    core = linear_coefficients(of_blocks, problem.reading)
+    core = jnp.broadcast_to(core, (len(blocks.count), CORE))
+    fitted = jnp.einsum("gij,gj->gi", factor[..., :CORE], core)
     volume = jnp.sum(blocks.count * (jnp.log(sd) + _HALF_LOG_2PI))
     return _Rows(
         blocks,
@@ -137,12 +136,7 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
 def gap_distribution(
     problem: Problem, values: Values
 ) -> tuple[Float[Array, " m"], Float[Array, "m k"]]:
-    """Return mean and root of the covariance of the discrepancy's integrated weights.
-
-    Args:
-        problem: structure.
-        values: shared parameters of one draw.
-    """
+    """Return mean and covariance root of the discrepancy's integrated weights."""
     mean, root = linear_part(problem, values).scores()
     scale = _gap_sd(problem, values)
     return scale * mean[-len(scale) :], scale[:, None] * root[-len(scale) :]

@@ -19,12 +19,7 @@ _MOST_ELIMINATED, _MOST_DENSE = 10_000, 500
 
 
 def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
-    """Return the number of members of each kind in the model.
-
-    Args:
-        case: records and labels.
-        with_gap: whether there is a leftover discrepancy.
-    """
+    """Return the number of members of each kind; with_gap adds the discrepancy's."""
     known = case.records.known
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
@@ -37,10 +32,9 @@ def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
 def integrated_kinds(
     name: str, counts: Mapping[str, int], linear: frozenset[str]
 ) -> tuple[str, ...]:
-    """Return the kinds of members to integrate out.
+    """Return the kinds of members to integrate out, the discrepancy last.
 
-    The first one is eliminated one by one, unless it is the discrepancy: of runs and
-    specimens the more numerous kind.
+    Of runs and specimens the more numerous kind is first: it is eliminated one by one.
 
     Args:
         name: of the case.

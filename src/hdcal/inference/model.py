@@ -13,9 +13,9 @@ from jax.nn import log_sigmoid, softplus
 
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
-from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import with_gains
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.serial_correlation import CORRELATION
@@ -31,6 +31,8 @@ def declare(problem: Problem) -> None:
     """Declare the joint density of parameters and data of the force model."""
     priors, values = problem.priors, sample_stiffness(problem.priors)
     values["alpha"] = sample_site("alpha", priors["alpha"])
+    if problem.runs:
+        values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
     values["force_offset"] = _sample_zero(problem, values)
     with_slack = SLACK in priors
     if not with_slack:
@@ -63,30 +65,20 @@ def sample_moved(
     """Sample scale · parameter + shift as a coordinate, and return the parameter."""
     if prior.family == "fixed":
         return sample_site(name, prior)
-    moved = numpyro.sample(coordinate, _scaled_and_moved(name, prior, scale, shift))
+    base = distribution(prior, name)
+    domain = base.support or dist.constraints.real
+    affine = dist.transforms.AffineTransform(shift, scale, domain=domain)
+    moved = numpyro.sample(coordinate, dist.TransformedDistribution(base, affine))
     return numpyro.deterministic(name, (moved - shift) / scale)
 
 
-def _scaled_and_moved(name: str, prior: Prior, scale, shift) -> dist.Distribution:
-    """Return the distribution of scale · parameter + shift."""
-    base = distribution(prior, name)
-    domain = base.support or dist.constraints.real
-    transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
-    return dist.TransformedDistribution(base, transform)
-
-
 def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
-    """Sample a parameter of an effect.
+    """Sample a parameter of an effect; `unit` is that of a half-normal one, or None.
 
     A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
     resolve: linear where they do, and a logarithm only below that. A plain logarithm
     stretches the neighbourhood of zero, where an absent effect has its posterior. The
     logistic density of u is divided out.
-
-    Args:
-        name: of the parameter.
-        prior: of the parameter.
-        unit: of one that is half-normal.
     """
     if unit is None:
         return sample_site(name, prior)
@@ -100,10 +92,9 @@ def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
 
 
 def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
-    """Sample E₀, what certificates state of the gauges, and K.
+    """Sample E₀, the gains and zeros that certificates state, and K.
 
-    The readings identify K·E₀ times the gauges' gains only, so that product is the
-    coordinate.
+    The readings identify only K·E₀ times the gauges' gains: that is the coordinate.
     """
     names = ["E0", *(name for name in GAUGE_UNITS if name in priors)]
     values = {name: sample_site(name, priors[name]) for name in names}
@@ -113,12 +104,13 @@ def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
 
 
 def _sample_zero(problem: Problem, values: Mapping):
-    """Sample the zero of the force, by the force at the centre of distant readings.
+    """Sample the zero of the force, of far readings by the force at their centre.
 
-    Along the ridge of zero and stiffness the force at the centre stays. The ridge is
-    straight in it, and curved in the zero and the logarithm of the stiffness.
+    That force is constant along the ridge of zero and stiffness, which is curved in
+    the zero and the logarithm of the stiffness.
     """
-    name, prior = "force_offset", problem.priors["force_offset"]
+    name = "force_offset"
+    prior = problem.priors_given(values)[name]
     if not problem.far:
         return sample_site(name, prior)
     there = stiffness(problem, values) * problem.centre
@@ -128,9 +120,8 @@ def _sample_zero(problem: Problem, values: Mapping):
 def _sample_contact(problem: Problem, values: Mapping):
     """Sample the point of first contact ω₀ with slack c, by where slack is taken up.
 
-    Rows of a gear that is pressed show ω₀ + c well, and neither ω₀ nor c. The
-    coordinate of c is curved, and so would be the narrow ridge along which they trade.
-    A gear that is both pressed and pulled shows ω₀ itself.
+    Rows of a gear that is pressed determine ω₀ + c well, and neither ω₀ nor c. Rows of
+    a gear that is both pressed and pulled determine ω₀ itself.
     """
     way = jnp.sign(problem.rows.deformation)
     pressed = jnp.mean(way, where=measured(len(way), problem.count))
@@ -141,26 +132,26 @@ def _sample_contact(problem: Problem, values: Mapping):
 def _sample_noise(problem: Problem, values: dict) -> None:
     """Sample the noise: its sd, the correlation of neighbours, and its growth.
 
-    Where neighbours are highly correlated rows show what each adds to the one before,
-    σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of what grows
-    with the force is divided by √(1 − ρ²).
+    Where neighbours are highly correlated rows determine what each adds to the one
+    before, σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of the
+    part that grows with the force is divided by √(1 − ρ²).
     """
-    prior, unshared = problem.priors["sigma"], 1.0
+    prior, added = problem.priors["sigma"], 1.0
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
-        unshared = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
-        values["sigma"] = sample_moved("sigma", prior, "_added_sd", unshared)
+        added = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
+        values["sigma"] = sample_moved("sigma", prior, "_added_sd", added)
     else:
         values["sigma"] = sample_site("sigma", prior)
     for effect in problem.effects:
         if effect.stage == "noise":
-            _sample_effect(problem, effect, values, unshared)
+            _sample_effect(problem, effect, values, added)
 
 
 def _sample_effect(
     problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
-    """Sample the parameters of an effect, amplitudes in their unit over that."""
+    """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
         unit = problem.units.get(name)
@@ -169,26 +160,21 @@ def _sample_effect(
 
 
 def _sample_members(problem: Problem, values: dict) -> None:
-    """Sample runs, specimens and the discrepancy, and their scales."""
+    """Sample runs, specimens and the discrepancy, and the last two's scales."""
     integrated, priors = problem.integrated, problem.priors
-    if problem.runs:
-        name = "run_offset_sd"
-        values[name] = sample_site(name, priors[name])
-        if problem.zero_stated:
-            _widen_zero(problem, values)
-        if "run" not in integrated:
-            seen = _mean_sd(problem, values, problem.runs)
-            values["run_offset"] = _sample_deviations(
-                "run_offset", values[name], seen, problem.runs
-            )
+    if problem.runs and "run" not in integrated:
+        known = _mean_sd(problem, values, problem.runs)
+        values["run_offset"] = _sample_deviations(
+            "run_offset", values["run_offset_sd"], known, problem.runs
+        )
     if problem.specimens:
         name = "specimen_sd"
         values[name] = sample_site(name, priors[name])
         if "specimen" not in integrated:
             usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
-            seen = _mean_sd(problem, values, problem.specimens) / usual
+            known = _mean_sd(problem, values, problem.specimens) / usual
             values["specimen_deviation"] = _sample_deviations(
-                "specimen_deviation", values[name], seen, problem.specimens
+                "specimen_deviation", values[name], known, problem.specimens
             )
     if (gap := problem.discrepancy) is not None:
         for name in ("gap_sd", "gap_length"):
@@ -199,21 +185,20 @@ def _sample_members(problem: Problem, values: dict) -> None:
             values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 
-def _sample_deviations(name: str, sd, seen_sd, count: int):
-    """Sample how far each tested member is from the mean of the tested members.
+def _sample_deviations(name: str, sd, known_sd, count: int):
+    """Sample the deviation of each tested member from the mean of the tested ones.
 
-    Partially centred: a score counts in sds that a member has given its own readings
-    and those of the others, so that it is as wide where members are alike as where they
-    are clearly apart. Either extreme is a funnel for the other (Papaspiliopoulos,
-    Roberts and Sköld, Statistical Science 22, 2007).
+    Partially centred: scores are in posterior sds of a member, so that they are as wide
+    where members are alike as where they clearly differ. Either extreme is a funnel for
+    the other (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22, 2007).
 
     Args:
-        name: of the members.
+        name: site of the members.
         sd: between members.
-        seen_sd: about how well its own readings determine a member.
-        count: of the members.
+        known_sd: about how well the readings of a member determine it.
+        count: number of members.
     """
-    spread = jnp.sqrt(1.0 + (sd / seen_sd) ** 2)
+    spread = jnp.sqrt(1.0 + (sd / known_sd) ** 2)
     score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(spread, (count,)))
     return numpyro.deterministic(name, sd / spread * score)
 
@@ -229,13 +214,3 @@ def _mean_square(problem: Problem, column):
     """Return the mean square of a column over the measured rows."""
     real = measured(len(column), problem.count)
     return jnp.sum(jnp.where(real, column**2, 0.0)) / problem.count
-
-
-def _widen_zero(problem: Problem, values: dict) -> None:
-    """Replace the prior of the gauge's zero by that of the mountings' mean zero."""
-    name = "force_offset"
-    gauge, both = (
-        jnp.asarray(distribution(priors[name], name).log_prob(values[name]))
-        for priors in (problem.priors, problem.priors_given(values))
-    )
-    numpyro.factor("_zero", both - gauge)

@@ -110,7 +110,7 @@ class ModelAverage:
     def from_tree(
         cls, tree: xr.DataTree, file: Path, effects: Library | None = None
     ) -> "ModelAverage":
-        """Return the models of a tree that was read; arguments as `Posterior`."""
+        """Return the models of a tree that was read from a file, as `load`."""
         try:
             left = json.loads(tree.attrs[_LEFT_OUT])
             shares = {name: n.attrs[_WEIGHT] for name, n in tree.children.items()}

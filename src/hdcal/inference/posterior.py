@@ -14,12 +14,6 @@ from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError, NotUsable
-from hdcal.inference.case_json import (
-    describe_case,
-    restore_case,
-    restore_priors,
-    to_json,
-)
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.posterior_file import (
@@ -29,7 +23,15 @@ from hdcal.inference.posterior_file import (
     not_a_posterior,
     read_tree,
 )
-from hdcal.inference.posterior_tree import OVER_DRAWS, group_of, joined_draws
+from hdcal.inference.posterior_tree import (
+    OVER_DRAWS,
+    describe_case,
+    group_of,
+    joined_draws,
+    restore_case,
+    restore_priors,
+    to_json,
+)
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.structure import ModelStructure
 from hdcal.inference.values import site_shapes
@@ -117,10 +119,14 @@ class Posterior(Shown):
         return build_problem(self.case, self.priors, self.effects, **given)
 
     @cached_property
+    def median(self) -> dict[str, np.ndarray]:
+        """Median of each site over all draws, in code units."""
+        return {name: np.median(v, axis=0) for name, v in self.draws.items()}
+
+    @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
         """The priors, that of the force zero given how the mountings differ."""
-        centre = {name: np.median(v, axis=0) for name, v in self.draws.items()}
-        return self.problem.priors_given(centre)
+        return self.problem.priors_given(self.median)
 
     def require_usable(self) -> None:
         """Raise when nothing may be derived from this posterior.
@@ -189,16 +195,7 @@ class Posterior(Shown):
         file: Path,
         effects: Mapping[str, type[Effect]] | None = None,
     ) -> Self:
-        """Return the posterior of a tree that was read.
-
-        Args:
-            tree: groups and attributes.
-            file: where it was read, for findings.
-            effects: as `load`.
-
-        Raises:
-            InputError: as `load`.
-        """
+        """Return the posterior of a tree that was read from a file, as `load`."""
         try:
             model = json.loads(tree.attrs["model"])
             if model["kind"] != cls.kind:

@@ -47,11 +47,7 @@ def file_of(path: Path | str) -> Path:
 
 
 def kind_of(path: Path | str) -> Kind | None:
-    """Return the kind of a posterior file; None where it is no posterior file.
-
-    Args:
-        path: a result folder or its posterior file.
-    """
+    """Return the kind of the posterior of a result folder; None if it is none."""
     file = file_of(path)
     if why_not_readable(file, _LARGEST_FILE) is not None:
         return None
@@ -63,14 +59,9 @@ def kind_of(path: Path | str) -> Kind | None:
 
 
 def content(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, str]) -> bytes:
-    """Return the content of a NetCDF file.
+    """Return the content of a NetCDF file with these groups and root attributes.
 
     It is made in memory: HDF5 crashes when a full disk refuses its writes.
-
-    Args:
-        tree: the groups.
-        kind: of the file.
-        attributes: of the root.
     """
     tree = tree.copy()
     tree.attrs = {FORMAT: kind.format, **attributes}
@@ -119,17 +110,14 @@ def digest(tree: xr.DataTree) -> str:
     whole = hashlib.sha256()
     for node in sorted(tree.subtree, key=lambda node: node.path):
         attributes = {n: v for n, v in node.attrs.items() if n != DIGEST}
-        head = json.dumps([node.path, attributes], sort_keys=True)
-        whole.update(head.encode())
+        whole.update(json.dumps([node.path, attributes], sort_keys=True).encode())
         variables = node.to_dataset(inherit=False).variables
         for name in sorted(map(str, variables)):
             one, values = variables[name], variables[name].values
             whole.update(json.dumps([name, one.dims, one.shape]).encode())
-            whole.update(
-                values.tobytes()
-                if values.dtype.kind in "biuf"
-                else json.dumps(values.tolist()).encode()
-            )
+            plain = values.dtype.kind in "biuf"
+            text = b"" if plain else json.dumps(values.tolist()).encode()
+            whole.update(values.tobytes() if plain else text)
     return whole.hexdigest()
 
 
@@ -156,10 +144,10 @@ def _missing(path: Path) -> Finding:
         try:
             answer = json.loads((path.parent / name).read_bytes())
             problem = f"the result {answer['schema']} in this folder has no posterior"
-            failed = answer["status"] == "failed"
+            failed = name == "verdict.json" and answer["status"] == "failed"
         except (OSError, ValueError, KeyError, TypeError):
             continue
-        if failed and name == "verdict.json":
+        if failed:
             reasons = "; ".join(map(str, answer.get("reasons", ())))
             raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
     return Finding(str(path), problem, "Name the folder of a calibration")

@@ -1,12 +1,19 @@
-"""Draws and data as the groups of an xarray DataTree, with ArviZ' names and axes."""
+"""A posterior as a DataTree: draws and data as ArviZ' groups, the case as JSON."""
 
+import json
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from math import isnan, nan
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from hdcal.data.records import Records
-from hdcal.quantities import FORCE, Quantities
+from hdcal.data.case import Case, Gear
+from hdcal.data.full_scale import FullScale
+from hdcal.data.priors import Prior
+from hdcal.data.records import Geometry, Records
+from hdcal.quantities import BY_LOAD, FORCE, Quantities
 
 OVER_DRAWS, OVER_ROWS = ("chain", "draw"), ("row",)
 _AXES = {
@@ -30,6 +37,9 @@ COVARIATES = {
     "force_sd": "N",
 }
 _OBSERVED = {"force": "N", "deformation": "mm"}
+# Fields of a case that its JSON holds as they are.
+_FIELDS = ("name", "run_labels", "specimen_labels", "data_sha256", "notes")
+_FIELDS += ("excluded", "excluded_sense")
 
 
 def dataset(
@@ -45,7 +55,7 @@ def dataset(
         arrays: by name.
         sample: their first axes.
         units: by name, of those that have one.
-        labels: of the places along an axis; chains and draws are numbered.
+        labels: along other axes; chains and draws are numbered.
     """
     units, variables = units or {}, {}
     for name, values in arrays.items():
@@ -53,9 +63,9 @@ def dataset(
         attributes = {"units": units[name]} if name in units else {}
         variables[name] = (axes, np.asarray(values), attributes)
     group = xr.Dataset(variables)
-    places = {axis: np.arange(group.sizes[axis]) for axis in sample if axis != "row"}
-    places |= {axis: list(each) for axis, each in (labels or {}).items()}
-    return group.assign_coords({n: v for n, v in places.items() if n in group.sizes})
+    coords = {axis: np.arange(group.sizes[axis]) for axis in sample if axis != "row"}
+    coords |= {axis: list(each) for axis, each in (labels or {}).items()}
+    return group.assign_coords({n: v for n, v in coords.items() if n in group.sizes})
 
 
 def data_groups(
@@ -93,3 +103,64 @@ def joined_draws(tree: xr.DataTree) -> dict[str, np.ndarray]:
         str(name): one.values.reshape(-1, *one.shape[2:])
         for name, one in group_of(tree, "posterior").data_vars.items()
     }
+
+
+def to_json(plain: Any) -> str:
+    """Return plain data as JSON; numbers may be arrays, dates become text."""
+    return json.dumps(
+        plain, default=lambda x: float(x) if hasattr(x, "__float__") else str(x)
+    )
+
+
+def restore_priors(held: Mapping[str, Mapping]) -> dict[str, Prior]:
+    """Return priors from the dictionaries that `asdict` makes."""
+    return {
+        name: Prior(**{**one, "numbers": tuple(one["numbers"])})
+        for name, one in held.items()
+    }
+
+
+def describe_case(case: Case) -> str:
+    """Return a case without its rows as JSON."""
+    gear = asdict(case.gear)
+    sizes = gear["geometry"].items()
+    gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes}
+    fields = {name: getattr(case, name) for name in _FIELDS}
+    fields |= {"load": case.units.load, "known": sorted(case.records.known)}
+    return to_json({**fields, "gear": gear})
+
+
+def restore_case(text: str, tree: xr.DataTree) -> Case:
+    """Return the case of a posterior.
+
+    Args:
+        text: from `describe_case`.
+        tree: groups with its rows.
+
+    Raises:
+        KeyError, TypeError, ValueError: text and rows do not describe a case.
+    """
+    fields = json.loads(text)
+    gear = fields["gear"]
+    for table in (name for name in gear if name.endswith("priors")):
+        gear[table] = restore_priors(gear[table])
+    sizes = gear["geometry"].items()
+    gear["geometry"] = Geometry(**{n: nan if v is None else v for n, v in sizes})
+    gear["full_scale"] = FullScale(**gear["full_scale"])
+    columns = group_of(tree, "constant_data")
+    rows = {name: columns[name].values for name in COVARIATES}
+    rows["force"] = group_of(tree, "observed_data")["force"].values
+    for name, column in rows.items():
+        if column.shape != (len(rows["force"]),) or not np.isfinite(column).all():
+            raise ValueError(f"{name} is no column of numbers")
+    for name in ("run", "specimen"):
+        if rows[name].max() >= len(fields[f"{name}_labels"]):
+            raise ValueError(f"a {name} has no label")
+    records = Records(**rows, known=frozenset(fields["known"]))
+    units = BY_LOAD[fields.get("load", FORCE.load)]
+    others = {name: _tuples(fields[name]) for name in _FIELDS}
+    return Case(gear=Gear(**gear), records=records, units=units, **others)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

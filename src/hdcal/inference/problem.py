@@ -27,6 +27,8 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
+# Parameters that every model has.
+SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
 _base_columns = jit(linear_columns)
 
 
@@ -34,29 +36,27 @@ class Problem(Sampled):
     """The force model of one case; only arrays change between data sets of one shape.
 
     Attributes:
-        priors: by site name, in code units; K under the problem's own theory.
+        priors: by site name, in code units; K under the theory of the problem.
         units: of the sampling coordinate of each half-normal amplitude.
         unit_stiffness: k_theory/E, radial [mm].
         reading: how the rig reads.
         records: all rows, padded, or None when they are compressed.
         blocks: compressed rows, or None.
         columns: basis of the discrepancy at the padded rows, or None.
-        discrepancy: the leftover one, or None.
+        discrepancy: the leftover discrepancy, or None.
         step: rounding step [N], 0 = none.
-        effects: the effect classes of the hypothesis, those of scatter left out.
+        effects: effect classes in the model, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with a zero each, 0 = none.
         specimens: number of specimens with a stiffness each, 0 = none.
-        integrated: which of "run", "specimen", "discrepancy" are integrated out, as
-            `integrated_kinds` orders them.
+        integrated: kinds that are integrated out, as `integrated_kinds` orders them.
         centre: middle of the deformations as read [mm].
         far: whether they lie far from the origin, compared with their range.
         count: measured rows; `records` and `columns` have padding after them.
         before: index of the row before each padded row in its run, −1 for none; or
             None where neighbours are not correlated or rows are compressed.
         correlated: whether neighbouring readings of a run may be correlated.
-        zero_stated: a certificate states the zero of the force gauge itself, to which
-            each mounting adds its own, see `priors_given`.
+        zero_stated: whether a certificate states the zero of the force gauge.
     """
 
     priors: dict[str, Prior]
@@ -80,12 +80,14 @@ class Problem(Sampled):
     correlated: bool = eqx.field(static=True, default=False)
     zero_stated: bool = eqx.field(static=True, default=False)
 
-    def priors_given(self, values: Mapping) -> dict[str, Prior]:
-        """Return the prior of each parameter given how mountings differ in a draw.
+    @property
+    def sampled_weights(self) -> int:
+        """Number of weights of a discrepancy that is not integrated out."""
+        is_sampled = "discrepancy" not in self.integrated
+        return self.discrepancy.size if self.discrepancy and is_sampled else 0
 
-        Args:
-            values: parameters of the draw.
-        """
+    def priors_given(self, values: Mapping) -> dict[str, Prior]:
+        """Return the prior of each parameter given how mountings differ in a draw."""
         mountings = self.runs if self.zero_stated else 0
         return effective_priors(self.priors, values, mountings)
 
@@ -108,10 +110,7 @@ class Problem(Sampled):
 
 
 def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return priors without unit and source, which are static.
-
-    Left in, another source line would mean another compilation.
-    """
+    """Return priors without unit and source, for which JAX would compile anew."""
     return {
         name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
         for name, prior in priors.items()
@@ -119,12 +118,21 @@ def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
 
 
 def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Return the effects that have sites of their own.
+    """Return the effects that have sites.
 
     Effects of scatter have none: wherever there are two runs or specimens these are
     members of the model, with the priors `run_offset_sd` and `specimen_sd`.
     """
     return tuple(effect for effect in effects if not issubclass(effect, Scatter))
+
+
+def effect_sites(effects: Sequence[type[Effect]]) -> list[str]:
+    """Return the names of the parameters of effects."""
+    return [
+        f"{effect.name}.{field}"
+        for effect in without_scatter(effects)
+        for field in parameters(effect)
+    ]
 
 
 def problem_priors(
@@ -137,19 +145,17 @@ def problem_priors(
 
     Args:
         case: gear with its own priors, which win.
-        effects: the effects in the model; those of scatter have no site.
+        effects: in the model.
         shipped: priors of every effect in the library.
         theory: which stiffness K multiplies.
 
     Raises:
         InputError: an effect's parameter has no prior.
     """
-    gear, effects = case.gear, without_scatter(effects)
+    gear = case.gear
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
     table |= gear.gauge_priors
-    names = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
-    names += [*SCALE_UNITS, *gear.gauge_priors]
-    names += [f"{effect.name}.{p}" for effect in effects for p in parameters(effect)]
+    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors, *effect_sites(effects)]
     missing = [name for name in names if name not in table]
     if missing:
         raise InputError(
@@ -212,7 +218,8 @@ def build_problem(
     records, reading = case.records, case_reading(case)
     form = structure or decide_structure(case, effects)
     leftover = build_discrepancy(records, effects) if form.with_gap else None
-    columns, keep = _columns(records, reading), form.rounded or bool(effects)
+    columns = np.asarray(_base_columns(pad_records(records), reading))
+    columns, keep = columns[: len(records.force)], form.rounded or bool(effects)
     rows = keep_or_compress(records, columns, leftover, keep, form.correlated)
     linear = set()
     if not (form.rounded or any(effect.mixture for effect in effects)):
@@ -223,10 +230,9 @@ def build_problem(
     problem = Problem(
         priors=without_texts(priors),
         units={
-            f"{effect.name}.{field}": float(prior.numbers[0])
-            for effect in effects
-            for field in parameters(effect)
-            if (prior := priors[f"{effect.name}.{field}"]).family == "half_normal"
+            name: float(priors[name].numbers[0])
+            for name in effect_sites(effects)
+            if priors[name].family == "half_normal"
         },
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
@@ -269,12 +275,6 @@ def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
     ]
     if findings:
         raise InputError(findings)
-
-
-def _columns(records: Records, reading: Reading) -> np.ndarray:
-    """Return the columns of the base model at the measured rows, shape (n, 4)."""
-    columns = _base_columns(pad_records(records), reading)
-    return np.asarray(columns)[: len(records.force)]
 
 
 def case_reading(case: Case) -> Reading:

@@ -4,6 +4,7 @@ They are made on what the model and every shape that was found leave.
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr, stdtr
@@ -38,7 +39,9 @@ def noise_faults(
     mixed: bool = False,
     correlation: float = 0.0,
 ) -> tuple[Structure, ...]:
-    """Return in which ways residuals are not the noise that the model has.
+    """Return how residuals differ from the noise that the model has.
+
+    The family-wise error of the tests is `FALSE_ALARM`.
 
     Args:
         data: residuals and what was absorbed, shapes that were found included.
@@ -48,16 +51,13 @@ def noise_faults(
             are then alike without any correlation.
         mixed: whether the model expects wild readings.
         correlation: of neighbouring readings in the model [-].
-
-    Returns:
-        The faults, at a family-wise error of `FALSE_ALARM`.
     """
     if len(sd) < _LEAST_ROWS:
         return ()
     before = previous_rows(records)
     follows = before >= 0
     # Squares of correlated errors come in waves, which pass for growth.
-    left = _Left(data, before, correlation)
+    left = _independent(data, before, correlation)
     tests = [_scatter(left, records, sd)]
     if not (rounded or mixed):
         added = sd * np.sqrt(1.0 - correlation**2 * follows)
@@ -68,32 +68,33 @@ def noise_faults(
     return tuple(test for test in adjusted if test.p_value <= FALSE_ALARM)
 
 
-class _Left:
+class _Left(NamedTuple):
     """Independent residuals beside all that was absorbed, in noise sds.
 
     Attributes:
         basis: orthonormal columns of all that was absorbed, (n + p, q).
         error: with the rows of the priors below those of the data, (n + p,).
         scaled: errors of the data's rows, of unit variance each, (n,).
+        free: degrees of freedom.
     """
 
-    def __init__(self, data: Whitened, before: np.ndarray, correlation: float):
-        size = len(before)
+    basis: np.ndarray
+    error: np.ndarray
+    scaled: np.ndarray
+    free: int
 
-        def white(table: np.ndarray) -> np.ndarray:
-            rows = whiten(table[:size], before, correlation)
-            return np.concatenate([rows, table[size:]])
 
-        self.basis = orthonormal(white(data.absorbed))
-        residual = white(data.residual)
-        self.error = residual - self.basis @ (self.basis.T @ residual)
-        kept = 1.0 - np.sum(self.basis[:size] ** 2, axis=1)
-        self.scaled = self.error[:size] / np.sqrt(np.maximum(kept, 1e-6))
-
-    @property
-    def free(self) -> int:
-        """Degrees of freedom."""
-        return len(self.error) - self.basis.shape[1]
+def _independent(data: Whitened, before: np.ndarray, correlation: float) -> _Left:
+    size = len(before)
+    absorbed, residual = (
+        np.concatenate([whiten(table[:size], before, correlation), table[size:]])
+        for table in (data.absorbed, data.residual)
+    )
+    basis = orthonormal(absorbed)
+    error = residual - basis @ (basis.T @ residual)
+    kept = 1.0 - np.sum(basis[:size] ** 2, axis=1)
+    scaled = error[:size] / np.sqrt(np.maximum(kept, 1e-6))
+    return _Left(basis, error, scaled, len(error) - basis.shape[1])
 
 
 def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Structure:
@@ -135,13 +136,8 @@ def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Stru
 def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     """Test whether a reading lies farther off than noise ever does.
 
-    Against the median of all, which a few wild ones do not move, and the rounding of a
-    display, below which the median may lie.
-
-    Args:
-        left: what is left of the rows.
-        records: the rows.
-        sd: of what each row errs beside the one before [N].
+    The scale is the median of all errors, which few wild readings do not change, or the
+    rounding of a display; `sd` [N] is that of each row given the one before.
     """
     size, far = len(sd), np.abs(left.scaled)
     rounding = least_step(records.force) / np.sqrt(12.0)

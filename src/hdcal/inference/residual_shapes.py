@@ -73,14 +73,9 @@ class Correlated:
 
 
 class _Test(NamedTuple):
-    """A t test of one column.
+    """A two-sided t test of the part of a column that the model leaves.
 
-    Attributes:
-        p_value: two-sided.
-        coefficient: of the remainder.
-        error: its standard error.
-        remainder: what the model leaves of the column, of unit length.
-        name: of the column.
+    `remainder` is that part, of unit length, and `coefficient` its coefficient.
     """
 
     p_value: float
@@ -135,17 +130,15 @@ def find_structure(
 ) -> tuple[Structure, ...]:
     """Find the shapes that residuals have beyond what the model can absorb.
 
-    The clearest shape is taken first; the others are then tested on what it leaves.
+    The clearest shape is taken first; the others are then tested on what it leaves,
+    each at a family-wise error of `FALSE_ALARM`: Bonferroni over the shapes still
+    tried, in all searches.
 
     Args:
         data: residuals, sensitivities and shapes.
         sd: noise sd of each row [N].
         noise: how neighbours may be correlated; None where they are not in the model.
         looks: number of searches for the same shapes.
-
-    Returns:
-        The shapes found, each at a family-wise error of `FALSE_ALARM`, Bonferroni
-        over the shapes still tried, in all looks.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed
     structures: list[Structure] = []
@@ -184,21 +177,11 @@ def _tests(
     basis: np.ndarray,
     noise: Correlated | None,
 ) -> list[_Test]:
-    """Test each column given what is absorbed, by generalised least squares.
+    """Test each column that the model does not absorb, by generalised least squares.
 
-    Where neighbours may be correlated the p value is that given ρ, averaged over
-    what the data say of ρ with that column in the model: a bend alone passes for
-    correlation.
-
-    Args:
-        residual: in noise sds, shape (n,).
-        columns: likewise, by name.
-        basis: from `orthonormal`.
-        noise: how neighbours may be correlated.
-
-    Returns:
-        A test of each column that the model does not absorb; none where too few rows
-        are left.
+    Where neighbours may be correlated the p value given ρ is averaged over the
+    posterior of ρ with that column in the model: a bend alone passes for correlation.
+    There are no tests where too few rows are left.
     """
     size, free = basis.shape[1], len(residual) - basis.shape[1] - 1
     units = {}
@@ -232,9 +215,9 @@ def _tests(
 
 
 def _products(table: np.ndarray, noise: Correlated | None):
-    """Return products of the columns whitened with each ρ, (m, k, k), and log weights.
+    """Return inner products of the columns whitened with each ρ, and its log weight.
 
-    The weight of ρ, (m,), is that of its prior times the density of the whitening.
+    The weight of ρ is that of its prior times the density of the whitening.
     """
     if noise is None:
         return (table.T @ table)[None], np.zeros(1)

@@ -78,7 +78,7 @@ def residuals(posterior: Posterior) -> Residuals:
     thinned = {name: values[::every] for name, values in posterior.draws.items()}
     fitted = np.asarray(_fit(problem, thinned, padded, columns))[: len(records.force)]
     residual = np.asarray(records.force) - fitted
-    centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
+    centre = posterior.median
     near = linearise(problem, centre, records)
     whitened = _whiten(posterior, centre, near, residual)
     noise = None
@@ -104,16 +104,13 @@ def residuals(posterior: Posterior) -> Residuals:
         fitted=fitted,
         residual=residual,
         standardised=residual / near.sd,
-        structure=_in_words(structure, posterior),
-        noise=_in_words(faults, posterior),
+        structure=_in_words(structure, posterior.case.units),
+        noise=_in_words(faults, posterior.case.units),
         units=posterior.case.units,
     )
 
 
-def _in_words(
-    found: tuple[Structure, ...], posterior: Posterior
-) -> tuple[Structure, ...]:
-    units = posterior.case.units
+def _in_words(found: tuple[Structure, ...], units: Quantities):
     return tuple(replace(one, words=units.say(one.words)) for one in found)
 
 
@@ -137,29 +134,26 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
         columns.append(slope[:, None] * prior_sd)
         pull.append(np.array([(mean - centre[name]) / prior_sd]))
     below = np.concatenate(pull)
-    reference = posterior.case.gear.reference_temperature
+    case = posterior.case
+    shapes = shapes_of(case.records, case.gear.reference_temperature)
     return Whitened(
         residual=np.concatenate([residual / sd, below]),
         absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(below))]),
         shapes={
             name: (np.concatenate([column / sd, 0.0 * below]), up, down)
-            for name, (column, up, down) in shapes_of(
-                posterior.case.records, reference
-            ).items()
+            for name, (column, up, down) in shapes.items()
         },
     )
 
 
 def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
-    """Return a warning for all that the model left in the residuals.
+    """Return a warning for each shape or fault of the noise in the residuals.
 
-    For answers that take the model for right. A leftover discrepancy has taken what
-    depends on the deformation alone; a loop, for one, it cannot take. So is noise whose
-    correlation makes intervals too narrow.
+    For answers that take the model for right.
 
     Args:
         posterior: from `calibrate`.
-        shapes: whether to warn of them.
+        shapes: whether to warn of shapes.
     """
     left = residuals(posterior)
     diagnosed = HYPOTHESIS in posterior.settings

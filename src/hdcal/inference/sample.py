@@ -7,7 +7,7 @@ be shown and an interruption takes effect.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import jax
 import jax.numpy as jnp
@@ -63,6 +63,11 @@ class Draws:
     acceptance: np.ndarray
     step_size: np.ndarray
     target_acceptance: float
+
+    @cached_property
+    def median(self) -> dict[str, np.ndarray]:
+        """Median of each parameter over all draws."""
+        return {name: np.median(v, axis=(0, 1)) for name, v in self.values.items()}
 
 
 def sample(

@@ -11,8 +11,7 @@ from hdcal.data.priors import Prior
 class Sampled(eqx.Module):
     """A pytree of data and priors that declares its density.
 
-    Another kind of problem subclasses this; sampler, whitening and checks then serve it
-    as they are.
+    Sampler, whitening and checks serve every subclass.
 
     Attributes:
         priors: by site name, in code units.
@@ -26,16 +25,17 @@ class Sampled(eqx.Module):
         """Whether its density has bends, at which the gradient jumps."""
         return False
 
+    @property
+    def sampled_weights(self) -> int:
+        """Number of weights of a discrepancy that is not integrated out."""
+        return 0
+
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
         raise NotImplementedError(type(self).__name__)
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
-        """Return the prior of each parameter given the scales of one draw.
-
-        Args:
-            values: parameters of the draw.
-        """
+        """Return the prior of each parameter given the scales of one draw."""
         return self.priors
 
 

@@ -8,44 +8,30 @@ from jaxtyping import Float
 
 from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
-from hdcal.inference.compression import CompressedRows
 from hdcal.inference.gauges import as_read
 from hdcal.inference.members import MEMBER_SD, MEMBERS, member_counts
-from hdcal.inference.problem import Problem, without_scatter
+from hdcal.inference.problem import SITES, Problem, effect_sites
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.structure import ModelStructure
-from hdcal.physics.chain import Base, linear_coefficients, predict_reading
+from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
 # Float scalars and arrays by site name.
 Values = Mapping[str, Any]
 
-# Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
-CORE, ONE = 4, 2
 # Least noise sd that rounded readings distinguish from none, in steps; twice as much
 # noise is raised by 5e-4 of it.
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
 def site_shapes(
-    case: Case,
-    effects: Sequence[type[Effect]],
-    structure: ModelStructure,
+    case: Case, effects: Sequence[type[Effect]], structure: ModelStructure
 ) -> dict[str, tuple[int, ...]]:
-    """Return the shape of each parameter that a draw of the model holds.
-
-    Args:
-        case: records and gear.
-        effects: in the model.
-        structure: of the model.
-    """
-    names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
-    names += case.gear.gauge_priors
-    for effect in without_scatter(effects):
-        names += [f"{effect.name}.{field}" for field in parameters(effect)]
+    """Return the shape of each parameter that a draw of a model holds."""
+    names = ["stiffness", *SITES, *case.gear.gauge_priors, *effect_sites(effects)]
     if structure.correlated:
         names.append(CORRELATION)
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
     for kind, count in member_counts(case, structure.with_gap).items():
         scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
         shapes |= {**dict.fromkeys(scales, ()), MEMBERS[kind]: (count,)}
@@ -129,14 +115,3 @@ def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
     logs = jnp.log(noise.sd), jnp.log(LEAST_NOISE * step)
     power = jnp.logaddexp(*(_SHARPNESS * log for log in logs))
     return Noise(noise.log_weight, jnp.exp(power / _SHARPNESS))
-
-
-def block_coefficients(
-    problem: Problem, blocks: CompressedRows, values: Values
-) -> Float[Array, "g p"]:
-    """Return the coefficients of each block, those of the discrepancy zero."""
-    base = member_base(problem, values, blocks.run, blocks.specimen)
-    core = linear_coefficients(base, problem.reading)
-    core = jnp.broadcast_to(core, (len(blocks.count), CORE))
-    width = blocks.factor.shape[-1] - 1
-    return jnp.pad(core, ((0, 0), (0, width - CORE)))

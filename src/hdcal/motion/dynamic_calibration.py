@@ -13,13 +13,11 @@ from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.assembly import (
     MOST_LOG_LIKELIHOODS,
-    TOTAL,
     Specifics,
     assemble,
     run_settings,
 )
 from hdcal.inference.checks import Check
-from hdcal.inference.density import densities
 from hdcal.inference.sample import (
     Draws,
     Progress,
@@ -129,9 +127,9 @@ def _specifics(
 
 
 def _log_likelihood(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
-    """Return the log likelihood by draw and row, or the totals of many."""
+    """Return the log likelihood by draw and row; nothing if they are many."""
     if found.energy.size * problem.count > MOST_LOG_LIKELIHOODS:
-        return {TOTAL: densities(problem, found.values)[1]}
+        return {}
     each = np.asarray(_pointwise(problem, found.values))
     return {"deformation": each[..., : problem.count]}
 

@@ -17,9 +17,9 @@ from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.data.theory_names import Theory
-from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import where_read, with_gains
+from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_amplitude, sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
 from hdcal.inference.problem import (

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import root_scalar
 from scipy.special import softmax
-from scipy.stats import multivariate_t
 
-from hdcal.inference.importance import TMixture
+from hdcal.inference.importance import t_mixture
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
 _FREE, _SPREAD = 5.0, 1.3
@@ -40,11 +39,8 @@ class SamplingLaws:
             count: of the points.
             rng: source of randomness.
         """
-        laws = [
-            multivariate_t(centre, _SPREAD**2 * _wide(shape), _FREE)
-            for centre, shape in self.places
-        ]
-        law = TMixture([1.0 / len(laws)] * len(laws), laws)
+        scales = [(at, _SPREAD**2 * _wide(shape)) for at, shape in self.places]
+        law = t_mixture([1.0 / len(scales)] * len(scales), scales, _FREE)
         points = rng.normal(size=(count, len(self.counts)))
         log_law = -0.5 * np.sum(points[:, ~self.counts] ** 2, axis=1)
         points[:, self.counts] = law.draw(count, rng)
