@@ -78,9 +78,9 @@ def assemble(
     Args:
         case: data and gear.
         priors: of every site.
-        problem: what was sampled.
+        problem: inference problem.
         draws: from the sampler.
-        own: of this kind of calibration.
+        own: results of this kind of calibration.
         seed: of the prior draws.
     """
     values = draws.values
@@ -161,12 +161,7 @@ def _pointwise(problem, values, records, columns, before):
 
 
 def run_settings(draws: Draws, began: float) -> dict[str, object]:
-    """Return the settings that are known after a run.
-
-    Args:
-        draws: from the sampler.
-        began: `time.perf_counter` at its beginning [s].
-    """
+    """Return the settings known after a run that began at a `time.perf_counter`."""
     return {
         "draws": draws.energy.shape[1],
         "target_acceptance": draws.target_acceptance,

@@ -39,7 +39,7 @@ class Check:
     """One check and what it found.
 
     Attributes:
-        name: what was checked.
+        name: the property that is checked.
         outcome: failed = do not use the result; warning and note = read this.
         words: one sentence for people.
     """
@@ -232,12 +232,7 @@ def listed(names: list[str]) -> str:
 def identification_checks(
     without_effect: list[str], flat: list[str]
 ) -> tuple[Check, ...]:
-    """Report parameters and directions that the prior decides.
-
-    Args:
-        without_effect: names of parameters that the data do not depend on.
-        flat: a sentence for each flat direction.
-    """
+    """Report parameters and directions that the prior decides, from `unidentified`."""
     seen, apart = "every parameter is seen by the data", "parameters can be told apart"
     checks = [
         Check(seen, "note", f"{name}: these data say nothing, the prior is the answer")

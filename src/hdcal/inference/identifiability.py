@@ -118,10 +118,10 @@ def resolved_units(
     By linear least squares with the base model, and never more than the prior sd.
 
     Args:
-        problem: structure, with the prior sds of the amplitudes as their units.
+        problem: with the prior sds of the amplitudes as their units.
         records: the rows, not padded.
         base_columns: of the base model, shape (n, 4).
-        noise_sd: pilot noise [N].
+        noise_sd: of a pilot fit [N].
     """
     slope = np.polyfit(records.deformation, records.force, 1)[0]
     unit_slope = problem.unit_stiffness * problem.reading.radial_per_read
@@ -172,12 +172,8 @@ def unidentified(
 ) -> tuple[list[str], list[str]]:
     """Return parameters without any effect, and a sentence for each flat direction.
 
-    A direction is flat when the data say less along it than the priors do: with J the
-    sensitivity in noise sds and S the prior sds, where ‖J v‖² < ‖v/S‖².
-
-    Args:
-        sensitivities: of the readings to each parameter, in noise sds.
-        problem: priors.
+    A direction v is flat where the data have less information than the priors:
+    ‖J v‖² < ‖v/S‖² with J the sensitivities in noise sds and S the prior sds.
     """
     # In units of its prior sd every parameter has prior precision one.
     scaled = {

@@ -73,13 +73,7 @@ def t_mixture(
     scales: Sequence[tuple[np.ndarray, np.ndarray]],
     freedom: float,
 ) -> TMixture:
-    """Return a mixture of multivariate t distributions of the same degrees of freedom.
-
-    Args:
-        share: of each component.
-        scales: centre and scale matrix of each.
-        freedom: degrees of it.
-    """
+    """Return a mixture by the centre and scale matrix of each component."""
     frozen: Any = multivariate_t
     return TMixture(share, [frozen(*scale, freedom) for scale in scales])
 
@@ -107,7 +101,8 @@ def sample_by_importance(
 ) -> ImportanceDraws | None:
     """Draw from a posterior with few parameters, in its whitened coordinates.
 
-    The proposals are worth at least half as many independent draws as are kept.
+    The effective sample size of the proposals is at least half the number of draws.
+    None is returned where proposals cover the posterior badly.
 
     Args:
         problem: the inference problem, with every parameter among its coordinates.
@@ -116,9 +111,6 @@ def sample_by_importance(
         chains: groups of draws.
         draws: kept of each group.
         progress: called with (densities computed, densities in all).
-
-    Returns:
-        The draws; None where proposals cover the posterior badly.
     """
     rng, kept = np.random.default_rng(seed), chains * draws
     proposals, efficiency = _adapted(problem, whitening, rng)

@@ -74,7 +74,7 @@ class Linear(eqx.Module):
         residual: reading less its mean, shape (r,).
         design: Z, contribution of each score to the rows.
         log_scale: Σ log sd √(2π) over the measured rows.
-        grouped: members besides the scores, or None.
+        grouped: members to eliminate one by one, or None.
     """
 
     residual: Float[Array, " r"]
@@ -133,9 +133,5 @@ class Linear(eqx.Module):
 
 
 def contrasts(count: int) -> Float[Array, "count k"]:
-    """Return an orthonormal basis of deviations that sum to zero, [count, count−1].
-
-    Deviations from the mean of the tested members: their common part is already
-    the population's centre.
-    """
+    """Return an orthonormal basis of deviations that sum to zero, [count, count−1]."""
     return jnp.asarray(helmert(count).T)

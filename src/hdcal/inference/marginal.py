@@ -1,9 +1,9 @@
 """Runs, specimens and the discrepancy, integrated out exactly.
 
 Given the shared parameters they are normal a priori and enter a Gaussian likelihood
-linearly. Sampling them beside their own scale makes funnels in which a sampler can be
-wrong without a warning. Each row belongs to one run and to one specimen: the more
-numerous kind is eliminated one by one.
+linearly. Sampled together with their scale they make funnels, in which a sampler can be
+wrong without a warning. Of runs and specimens the more numerous kind is eliminated one
+by one.
 """
 
 import math

@@ -74,11 +74,7 @@ class ModelAverage:
         return tree
 
     def require_usable(self) -> None:
-        """Raise if any model failed its checks.
-
-        Raises:
-            NotUsable: with the reasons.
-        """
+        """Raise `NotUsable` if any model failed its checks."""
         for _, posterior in self.posteriors.values():
             posterior.require_usable()
 

@@ -1,8 +1,7 @@
 """Row buckets: few array lengths, so that few executables serve data of every size.
 
-JAX compiles one executable for each shape of its arguments. Rows are therefore padded,
-outside of what is compiled, to one of a few lengths. Where rows are summed, `measured`
-or a weight of zero leaves the padding out.
+JAX compiles one executable for each shape of its arguments: rows are padded to one of
+a few lengths. In sums over rows `measured` or a weight of zero leaves padding out.
 """
 
 from typing import Literal, TypeVar
@@ -22,12 +21,8 @@ _SMALLEST = 16
 def bucket_size(rows: int) -> int:
     """Return the length that so many rows are padded to.
 
-    Lengths are 16, 24, 32, 48, 64, 96, …: two per doubling, so that at most a third
-    of the padded rows are padding (from 16 rows on) and a million rows know 33
-    lengths.
-
-    Args:
-        rows: number of rows; none count as one.
+    Lengths are 16, 24, 32, 48, 64, 96, …: from 16 rows on at most a third of the padded
+    rows are padding, and up to a million rows there are 33 lengths.
     """
     power = _SMALLEST
     while power < rows:
@@ -37,19 +32,15 @@ def bucket_size(rows: int) -> int:
 
 
 def repeat_last_row(tree: Tree, size: int) -> Tree:
-    """Return arrays of at least one row, followed by copies of the last one.
+    """Return arrays with a common first axis, padded with copies of the last row.
 
     For records: a load that is held changes nothing in the rows before it.
-
-    Args:
-        tree: pytree of arrays that share their first axis.
-        size: rows in all, as `bucket_size` gives it.
     """
     return jax.tree.map(lambda array: _padded(array, size, "edge"), tree)
 
 
 def append_zeros(tree: Tree, size: int) -> Tree:
-    """Return arrays followed by rows of zeros; arguments as `repeat_last_row`."""
+    """Return arrays with a common first axis, padded with rows of zeros."""
     return jax.tree.map(lambda array: _padded(array, size, "constant"), tree)
 
 
@@ -60,15 +51,10 @@ def _padded(array, size: int, mode: Literal["edge", "constant"]) -> np.ndarray:
 
 
 def pad_records(records: Records) -> Records:
-    """Return records with their last row repeated up to the size of their bucket."""
+    """Return records padded to the size of their bucket."""
     return repeat_last_row(records, bucket_size(len(records.force)))
 
 
 def measured(size: int, count) -> Bool[Array, " n"]:
-    """Return which of the padded rows were measured; serves inside `jax.jit`.
-
-    Args:
-        size: rows in all.
-        count: rows that were measured, not compiled in.
-    """
+    """Return which of `size` padded rows were measured; serves inside `jax.jit`."""
     return jnp.arange(size) < count

@@ -55,8 +55,8 @@ class Posterior(Shown):
         priors: of every site, in code units, K under `theory`.
         tree: the groups posterior, prior, sample_stats, observed_data, constant_data
             and log_likelihood, for ArviZ.
-        diagnoses: sampling quality and driver by parameter.
-        checks: what was checked and what came out.
+        diagnoses: convergence and driver by parameter.
+        checks: with their outcomes.
         settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
             `STRUCTURE`.
     """
@@ -135,10 +135,8 @@ class Posterior(Shown):
             NotUsable: with the reasons.
         """
         if not self.usable:
-            raise NotUsable(
-                "this calibration failed its checks and must not be used: "
-                + "; ".join(self.reasons)
-            )
+            words = "this calibration failed its checks and must not be used"
+            raise NotUsable(f"{words}: {'; '.join(self.reasons)}")
 
     def save(self, path: Path | str) -> None:
         """Write the posterior as a NetCDF file that ArviZ opens."""
@@ -173,20 +171,14 @@ class Posterior(Shown):
 
         Args:
             path: a result folder or its posterior.nc.
-            effects: the library in which the effects' names are looked up; needed
-                for effects from outside.
+            effects: library of effects; needed for effects from outside.
 
         Raises:
             InputError: the file is missing, damaged, changed, of several models or
                 from another version, or names an effect that the library lacks.
         """
         file = file_of(path)
-        tree = read_tree(file)
-        if "model" not in tree.attrs:
-            problem = "is of a diagnosis, which averages over several models"
-            remedy = "Load it with hdcal.ModelAverage.load"
-            raise InputError([Finding(str(file), problem, remedy)])
-        return cls.from_tree(tree, file, effects)
+        return cls.from_tree(read_tree(file), file, effects)
 
     @classmethod
     def from_tree(
@@ -196,6 +188,10 @@ class Posterior(Shown):
         effects: Mapping[str, type[Effect]] | None = None,
     ) -> Self:
         """Return the posterior of a tree that was read from a file, as `load`."""
+        if "model" not in tree.attrs:
+            problem = "is of a diagnosis, which averages over several models"
+            remedy = "Load it with hdcal.ModelAverage.load"
+            raise InputError([Finding(str(file), problem, remedy)])
         try:
             model = json.loads(tree.attrs["model"])
             if model["kind"] != cls.kind:

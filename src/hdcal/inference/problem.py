@@ -207,7 +207,7 @@ def build_problem(
         shipped: priors of every effect in the library.
         effects: in the model; those of scatter change nothing.
         theory: overrides the gear's theory.
-        structure: of the model; by default what the readings show.
+        structure: of the model; by default decided from the readings.
 
     Raises:
         InputError: an effect lacks its covariates or a prior.
@@ -259,11 +259,7 @@ def build_problem(
 
 
 def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
-    """Check that the data have what the effects need.
-
-    Raises:
-        InputError: an effect lacks a covariate.
-    """
+    """Raise `InputError` where the data lack a covariate that an effect needs."""
     findings = [
         Finding(
             case.name,

@@ -1,7 +1,4 @@
-"""Tests whether residuals are the noise of the model: independent, of one size.
-
-They are made on what the model and every shape that was found leave.
-"""
+"""Tests of whether residuals are the noise of the model: independent, of one size."""
 
 from dataclasses import replace
 from typing import NamedTuple

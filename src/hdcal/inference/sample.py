@@ -1,8 +1,7 @@
 """NumPyro's NUTS in whitened coordinates.
 
-One executable serves every data set of one bucket of rows, because data, priors and
-whitening are arguments of it. It advances in short stretches, so that progress can
-be shown and an interruption takes effect.
+Data, priors and whitening are arguments of one executable for each bucket of rows. It
+advances in short stretches, for progress to be shown and interruptions to take effect.
 """
 
 from collections.abc import Callable
@@ -33,7 +32,7 @@ _STRETCH = 50
 _LONGEST = 4
 # Draws of a chain for each effective one that is needed; a shorter run is not extended.
 _ENOUGH = 8
-# Chains start this many posterior sds apart, so that R-hat can see them disagree.
+# Spread of the chains' starts in posterior sds, so that R-hat can detect disagreement.
 _OVERDISPERSION = 2.0
 # Fields of the sampler's state that are kept of each draw, `adapt_state` apart.
 _KEPT = ("z", "energy", "potential_energy", "diverging", "num_steps", "accept_prob")
@@ -46,13 +45,13 @@ class Draws:
 
     Attributes:
         values: by site name, in code units.
-        energy: Hamiltonian of each draw.
+        energy: Hamiltonian.
         potential: −log posterior density in unconstrained coordinates.
         diverging: whether the trajectory diverged.
         n_steps: leapfrog steps of the trajectory.
         acceptance: mean acceptance probability of the trajectory.
-        step_size: adapted step size.
-        target_acceptance: mean acceptance that the step size was adapted to.
+        step_size: adapted to `target_acceptance`.
+        target_acceptance: mean acceptance that was aimed at.
     """
 
     values: dict[str, np.ndarray]
@@ -241,7 +240,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 @jit
 def _constrain(problem, whitening, standard, seed, first):
-    """Return parameters by name, members that were integrated out drawn again.
+    """Return parameters by name, with draws of the members that were integrated out.
 
     Args:
         problem: the inference problem.
