@@ -35,7 +35,7 @@ _PRIOR_DRAWS = 2000
 # The log likelihood of every row and draw is not kept above this many numbers.
 MOST_LOG_LIKELIHOODS = 8_000_000
 TOTAL = "total"
-# Units of what follows from the parameters, and of what has no prior of its own.
+# Units of what follows from the parameters, and of what has no prior of its specifics.
 _UNITS = {
     "stiffness": "N/mm",
     "damping": "N*s/mm",
@@ -70,7 +70,7 @@ def assemble(
     priors: Mapping[str, Prior],
     problem: Sampled,
     draws: Draws,
-    own: Specifics,
+    specifics: Specifics,
     seed: int,
 ) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
     """Return the tree, diagnoses and checks of a posterior.
@@ -80,7 +80,7 @@ def assemble(
         priors: of every site.
         problem: inference problem.
         draws: from the sampler.
-        own: results of this kind of calibration.
+        specifics: results of this kind of calibration.
         seed: of the prior draws.
     """
     values = draws.values
@@ -106,22 +106,29 @@ def assemble(
         "posterior": dataset(values, units=units, labels=labels),
         "prior": dataset(prior_draws, units=units),
         "sample_stats": dataset(_statistics(draws)),
-        **data_groups(case.records, own.observed, case.units),
-        "log_likelihood": dataset(own.log_likelihood or {TOTAL: log_likelihood}),
+        **data_groups(case.records, specifics.observed, case.units),
+        "log_likelihood": _likelihood_group(specifics.log_likelihood, log_likelihood),
     }
-    if not own.log_likelihood:
-        groups["log_likelihood"][TOTAL].attrs["comment"] = (
-            "log likelihood of all rows, runs, specimens and gap integrated out where "
-            "they were; values by row are not kept for so many rows"
-        )
     checks = (
-        *sampling_checks(draws, diagnoses | mixing(own.mixed)),
-        *own.checks,
+        *sampling_checks(draws, diagnoses | mixing(specifics.mixed)),
+        *specifics.checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
-        *identification_checks(*unidentified(own.sensitivities, problem)),
+        *identification_checks(*unidentified(specifics.sensitivities, problem)),
     )
     return xr.DataTree.from_dict(groups), diagnoses, checks
+
+
+def _likelihood_group(by_row: Mapping[str, np.ndarray], total: np.ndarray):
+    """Return the log likelihood by row, or the total where there is none."""
+    if by_row:
+        return dataset(by_row)
+    group = dataset({TOTAL: total})
+    group[TOTAL].attrs["comment"] = (
+        "log likelihood of all rows, runs, specimens and gap integrated out where "
+        "they were; values by row are not kept for so many rows"
+    )
+    return group
 
 
 def _statistics(draws: Draws) -> dict[str, np.ndarray]:

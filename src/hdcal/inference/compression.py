@@ -91,7 +91,7 @@ def keep_or_compress(
     before = previous_rows(records) if correlated else None
     shapes = np.empty((count, 0)) if columns is None else columns[:count]
     design = np.hstack([base_columns, shapes])
-    blocks = None if keep else compress_if_smaller(records, design, before)
+    blocks = None if keep else _compress_if_smaller(records, design, before)
     kept: dict[str, Any] = dict.fromkeys(("records", "columns", "before"))
     if blocks is None:
         if before is not None:
@@ -101,12 +101,12 @@ def keep_or_compress(
     return {**kept, "blocks": blocks, "count": count}
 
 
-def compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
+def _compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
     """Return the rows compressed, or None where that would be no smaller."""
-    own = np.asarray(records.force_sd)
-    earlier = own if before is None else np.where(before < 0, own, own[before])
-    distinct, group = group_rows(records.run, records.specimen, own, earlier)
-    # One factor per row (an sd of its own in each) would be larger than the rows.
+    sd = np.asarray(records.force_sd)
+    earlier = sd if before is None else np.where(before < 0, sd, sd[before])
+    distinct, group = group_rows(records.run, records.specimen, sd, earlier)
+    # One factor per row, where every sd differs, would be larger than the rows.
     factor_rows = len(distinct) * (design.shape[1] + 1)
     if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
         return None

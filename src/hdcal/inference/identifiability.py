@@ -118,11 +118,18 @@ def resolved_units(
     By linear least squares with the base model, and never more than the prior sd.
 
     Args:
-        problem: with the prior sds of the amplitudes as their units.
+        problem: structure and priors.
         records: the rows, not padded.
         base_columns: of the base model, shape (n, 4).
         noise_sd: of a pilot fit [N].
     """
+    widest = {
+        name: float(prior.numbers[0])
+        for name, prior in problem.priors.items()
+        if "." in name and prior.family == "half_normal"
+    }
+    if not widest:
+        return {}
     slope = np.polyfit(records.deformation, records.force, 1)[0]
     unit_slope = problem.unit_stiffness * problem.reading.radial_per_read
     values = {"K": slope / unit_slope, "E0": 1.0, "sigma": noise_sd}
@@ -131,23 +138,21 @@ def resolved_units(
         for field, spec in parameters(effect).items():
             name = f"{effect.name}.{field}"
             prior = problem.priors[name]
-            if name in problem.units:
+            if name in widest:
                 # A tenth of the prior sd: at zero itself an effect may have no slope.
-                values[name] = problem.units[name] / 10.0
+                values[name] = widest[name] / 10.0
             elif spec.null is not None:
                 values[name] = spec.null
             else:
                 fixed = prior.family == "fixed"
                 values[name] = prior.numbers[0] if fixed else frozen(prior).median()
-    names, rows = tuple(problem.units), len(base_columns)
-    _, slopes, _ = _derivatives(
-        problem, values, pad_records(records), None, names=names
-    )
+    padded, rows = pad_records(records), len(base_columns)
+    _, slopes, _ = _derivatives(problem, values, padded, None, names=tuple(widest))
     return {
         name: standard_error(
-            np.asarray(slopes[name])[:rows], base_columns, noise_sd, widest
+            np.asarray(slopes[name])[:rows], base_columns, noise_sd, most
         )
-        for name, widest in problem.units.items()
+        for name, most in widest.items()
     }
 
 
@@ -192,7 +197,12 @@ def unidentified(
         # As few numbers as have the same inner products.
         few = np.linalg.qr(np.stack([*strong.values()], axis=1), mode="r")
         groups = _inseparable(dict(zip(strong, np.transpose(few), strict=True)))
-        sentences += [_sentence(names) for names in groups]
+        for names in groups:
+            every, words = listed(names), "one combination of them can"
+            if set(names) == {"K", "E0"}:
+                every = "K and E0"
+                words = "their product can, and with the prior of E0 that tells K"
+            sentences.append(f"{every} cannot be told apart by this data; {words}")
     return without_effect, sentences
 
 
@@ -230,13 +240,3 @@ def _strengths(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     padded = np.vstack([table, np.zeros((table.shape[1], table.shape[1]))])
     _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
     return strength, vectors
-
-
-def _sentence(names: list[str]) -> str:
-    if set(names) == {"K", "E0"}:
-        return (
-            "K and E0 cannot be told apart by this data; their product can, and with "
-            "the prior of E0 that tells K"
-        )
-    every = listed(names)
-    return f"{every} cannot be told apart by this data; one combination of them can"

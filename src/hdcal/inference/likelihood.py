@@ -17,10 +17,9 @@ from hdcal.inference.marginal import linear_part
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import given_before
+from hdcal.inference.serial_correlation import CORRELATION, given_before
 from hdcal.inference.values import (
     Values,
-    correlation_of,
     predict_rows,
     with_rounding,
 )
@@ -101,7 +100,7 @@ def pointwise_log_likelihood(
     mean, noise = predict_rows(problem, values, records, columns)
     noise = with_rounding(noise, problem.step, rounded=problem.rounded)
     if problem.correlated:
-        (sd,), correlation = noise.sd, correlation_of(values)
+        (sd,), correlation = noise.sd, values[CORRELATION]
         error = (records.force - mean) / sd
         mean, sd = given_before(mean, sd, error, before, correlation)
         noise = Noise(noise.log_weight, sd[None])

@@ -18,10 +18,9 @@ from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import log_volume, whiten
+from hdcal.inference.serial_correlation import CORRELATION, log_volume, whiten
 from hdcal.inference.values import (
     Values,
-    correlation_of,
     member_base,
     predict_rows,
     with_rounding,
@@ -37,7 +36,7 @@ class _Rows(NamedTuple):
     """Rows in noise sds, measured or compressed.
 
     Attributes:
-        labels: rows or blocks of rows, with the index of each one's members.
+        labels: rows or blocks of rows, with the indices of their members.
         residual: reading less mean, shape (r,).
         columns: contribution of a unit member of each kind to its rows.
         gap: columns of the discrepancy, or None.
@@ -90,7 +89,7 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
     mean, noise = predict_rows(problem, values, problem.rows, None)
     sd = with_rounding(noise, problem.step).sd[0]
     real = measured(len(sd), problem.count)
-    correlation, before = correlation_of(values), problem.before
+    correlation, before = values.get(CORRELATION, 0.0), problem.before
     following = 0 if before is None else jnp.sum(before >= 0)
 
     def white(column):
@@ -110,7 +109,7 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
 
 def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     assert problem.blocks is not None
-    correlation, noise = correlation_of(values), (values["sigma"], problem.step)
+    correlation, noise = values.get(CORRELATION, 0.0), (values["sigma"], problem.step)
     blocks = problem.blocks.whitened(correlation, *noise)
     sd = jnp.sqrt(blocks.variance(*noise))
     factor = blocks.factor / sd[:, None, None]

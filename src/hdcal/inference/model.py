@@ -65,11 +65,16 @@ def sample_moved(
     """Sample scale · parameter + shift as a coordinate, and return the parameter."""
     if prior.family == "fixed":
         return sample_site(name, prior)
+    moved = numpyro.sample(coordinate, _scaled_and_moved(name, prior, scale, shift))
+    return numpyro.deterministic(name, (moved - shift) / scale)
+
+
+def _scaled_and_moved(name: str, prior: Prior, scale, shift) -> dist.Distribution:
+    """Return the distribution of scale · parameter + shift."""
     base = distribution(prior, name)
     domain = base.support or dist.constraints.real
-    affine = dist.transforms.AffineTransform(shift, scale, domain=domain)
-    moved = numpyro.sample(coordinate, dist.TransformedDistribution(base, affine))
-    return numpyro.deterministic(name, (moved - shift) / scale)
+    transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
+    return dist.TransformedDistribution(base, transform)
 
 
 def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):

@@ -87,7 +87,7 @@ class Posterior(Shown):
 
     @property
     def structure(self) -> ModelStructure:
-        """What the model contains beside line and effects."""
+        """What the model contains besides line and effects."""
         return ModelStructure(**self.settings[STRUCTURE])
 
     @property

@@ -223,17 +223,12 @@ def build_problem(
     rows = keep_or_compress(records, columns, leftover, keep, form.correlated)
     linear = set()
     if not (form.rounded or any(effect.mixture for effect in effects)):
-        linear = {"run", "discrepancy"}
         # Through an effect the force need not be linear in the stiffness.
-        linear |= {"specimen"} if rows["blocks"] is not None else set()
+        linear = {"run", "discrepancy"} | ({"specimen"} if rows["blocks"] else set())
     members = member_counts(case, form.with_gap)
     problem = Problem(
         priors=without_texts(priors),
-        units={
-            name: float(priors[name].numbers[0])
-            for name in effect_sites(effects)
-            if priors[name].family == "half_normal"
-        },
+        units={},
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         discrepancy=leftover,
@@ -249,9 +244,7 @@ def build_problem(
         far=lies_far(records),
         **rows,
     )
-    if not problem.units:
-        return problem
-    # Late: sensitivities are those of a problem.
+    # Late: it imports this module.
     from hdcal.inference.identifiability import resolved_units
 
     units = resolved_units(problem, records, columns, form.noise_sd)

@@ -66,7 +66,7 @@ def noise_faults(
 
 
 class _Left(NamedTuple):
-    """Independent residuals beside all that was absorbed, in noise sds.
+    """Independent residuals less all that was absorbed, in noise sds.
 
     Attributes:
         basis: orthonormal columns of all that was absorbed, (n + p, q).
@@ -143,7 +143,7 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     chance = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
     row = int(np.argmax(far))
     wild = np.flatnonzero((chance <= FALSE_ALARM) & (times >= _WILD))
-    # The row after a wild one errs beside it.
+    # The row after a wild one is off as well.
     many = int(np.sum(np.diff(wild, prepend=-2) > 1))
     is_wild = 0 < many <= _FEW and far[row] ** 2 >= _SHARE * float(far @ far)
     others = f" ({many} such readings)" if many > 1 else ""

@@ -22,7 +22,7 @@ from hdcal.inference.residual_shapes import (
     shapes_of,
 )
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
-from hdcal.inference.values import correlation_of, predict_rows
+from hdcal.inference.values import predict_rows
 from hdcal.notebook import Shown
 from hdcal.quantities import FORCE, Quantities
 
@@ -32,7 +32,7 @@ _DRAWS = 200
 
 # How a warning begins that a shape is left in the residuals.
 SHAPED = "This takes the model's shape for right, but its residuals have one."
-_BESIDE = "That is left out, and little beside the noise."
+_SMALL_SHAPE = "That is left out, and little beside the noise."
 # Share of the noise below which a shape widens what one reading does by a twentieth.
 _SMALL = 1.0 / 3.0
 UNNAMED = "No cause named makes it"
@@ -93,7 +93,7 @@ def residuals(posterior: Posterior) -> Residuals:
         near.sd,
         rounded=float(problem.step) > float(np.median(near.sd)),
         mixed=any(effect.mixture for effect in posterior.effects),
-        correlation=float(correlation_of(centre)),
+        correlation=float(centre.get(CORRELATION, 0.0)),
     )
     return Residuals(
         deformation=np.asarray(records.deformation),
@@ -167,7 +167,7 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
         for shape in structure
         if shape.size_N > small
     ]
-    words += [f"{s.words} {_BESIDE}" for s in structure if s.size_N <= small]
+    words += [f"{s.words} {_SMALL_SHAPE}" for s in structure if s.size_N <= small]
     words += [fault.words for fault in left.noise]
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
     if alike.outcome == "warning":

@@ -107,7 +107,7 @@ def sample(
 
 
 def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
-    """Check that a run is long enough for its own checks, and not endless.
+    """Check that a run is long enough for its checks, and not endless.
 
     Raises:
         InputError: it is not.
@@ -120,19 +120,17 @@ def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
 
 def _extended(run: "_Run", draws: int) -> Draws:
     """Return the draws of a run, extended while its chains have not mixed."""
-    result = run.draws()
-    while (
-        _ENOUGH * ESS_PER_CHAIN <= result.energy.shape[1] < _LONGEST * draws
-        and not result.diverging.any()
-        and not have_mixed(_varying(result.values))
-    ):
+    while True:
+        found = run.draws()
+        values = found.values.items()
+        varying = {n: v for n, v in values if v.ndim == 2 and np.ptp(v) > 0.0}
+        if (
+            not _ENOUGH * ESS_PER_CHAIN <= found.energy.shape[1] < _LONGEST * draws
+            or found.diverging.any()
+            or have_mixed(varying)
+        ):
+            return found
         run.advance(draws)
-        result = run.draws()
-    return result
-
-
-def _varying(values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {n: v for n, v in values.items() if v.ndim == 2 and np.ptp(v) > 0.0}
 
 
 class _Run:
@@ -197,7 +195,7 @@ class _Run:
 
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
-    """Return NUTS' own init and step functions on standard coordinates."""
+    """Return the init and step functions of NUTS on standard coordinates."""
     init, step = hmc(
         lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
     )
@@ -214,8 +212,8 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
 @jit(static_argnames=("warmup", "chains"))
 def _start(problem, whitening, seed, chain, target, *, warmup, chains):
     """Return the state in which one of the chains starts, as its leaves."""
-    own, _ = jax.random.split(jax.random.key(seed))
-    place, walk = jax.random.split(jax.random.split(own, chains)[chain])
+    walks, _ = jax.random.split(jax.random.key(seed))
+    place, walk = jax.random.split(jax.random.split(walks, chains)[chain])
     spread = jax.random.normal(place, (len(whitening.factor),))
     start, _ = _kernel(problem, whitening, warmup, target)
     return jax.tree.leaves(start(_OVERDISPERSION * spread, rng_key=walk))
@@ -249,7 +247,7 @@ def _constrain(problem, whitening, standard, seed, first):
         seed: of the run.
         first: number of draws of each chain before these.
     """
-    _, own = jax.random.split(jax.random.key(seed))
+    _, members = jax.random.split(jax.random.key(seed))
     place = first + jnp.arange(standard.shape[1])
 
     def one(drawn):
@@ -263,4 +261,4 @@ def _constrain(problem, whitening, standard, seed, first):
         # One draw after the other: members by the thousand would fill the memory.
         return jax.lax.map(one, (coordinates, keys))
 
-    return jax.vmap(chain)(standard, jax.random.split(own, len(standard)))
+    return jax.vmap(chain)(standard, jax.random.split(members, len(standard)))

@@ -44,11 +44,6 @@ def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
     return radial * problem.reading.radial_per_read
 
 
-def correlation_of(values: Values) -> Float[Array, ""] | float:
-    """Return the correlation of neighbouring readings; 0 where it has no site."""
-    return values.get(CORRELATION, 0.0)
-
-
 def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
     """Return the base parameters of given runs and specimens, as read.
 
