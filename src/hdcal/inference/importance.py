@@ -10,7 +10,7 @@ Source:
     Research 25 (2024), Pareto k.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -42,40 +42,37 @@ _BLOCK = 500
 
 
 class TMixture(NamedTuple):
-    """A mixture of multivariate t distributions.
+    """A mixture of multivariate t distributions of equal degrees of freedom.
 
     Attributes:
-        share: of each component.
-        parts: SciPy's frozen `multivariate_t`.
+        share: of each component, shape (k,).
+        centre: shape (k, d).
+        root: Cholesky factor of the scale matrix, shape (k, d, d).
+        freedom: degrees of it.
     """
 
-    share: Sequence[float]
-    parts: Sequence[Any]
+    share: np.ndarray
+    centre: np.ndarray
+    root: np.ndarray
+    freedom: float = _FREEDOM
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Return places, shape (count, d), those of each component together."""
-        counts = rng.multinomial(count, self.share)
-        drawn = [
-            np.reshape(part.rvs(size, random_state=rng), (size, -1))
-            for part, size in zip(self.parts, counts, strict=True)
-            if size
-        ]
-        return np.concatenate(drawn)
+        """Return places, shape (count, d)."""
+        component = rng.choice(len(self.share), count, p=self.share)
+        normal = rng.standard_normal((count, self.centre.shape[1]))
+        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
+        step = np.einsum("nij,nj->ni", self.root[component], normal)
+        return self.centre[component] + tail[:, None] * step
 
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
-        each = [part.logpdf(place) for part in self.parts]
-        return np.logaddexp.reduce(np.log(self.share) + np.transpose(each), axis=1)
-
-
-def t_mixture(
-    share: Sequence[float],
-    scales: Sequence[tuple[np.ndarray, np.ndarray]],
-    freedom: float,
-) -> TMixture:
-    """Return a mixture by the centre and scale matrix of each component."""
-    frozen: Any = multivariate_t
-    return TMixture(share, [frozen(*scale, freedom) for scale in scales])
+        scipy_t: Any = multivariate_t
+        each = [
+            scipy_t.logpdf(place, centre, root @ root.T, self.freedom)
+            for centre, root in zip(self.centre, self.root, strict=True)
+        ]
+        each = np.reshape(each, (len(self.share), -1))
+        return np.logaddexp.reduce(np.log(self.share)[:, None] + each)
 
 
 class ImportanceDraws(NamedTuple):
@@ -154,8 +151,9 @@ def _adapted(
 
 
 def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
-    scales = [(centre, covariance), (centre, _WIDER**2 * covariance)]
-    return t_mixture((1.0 - _WIDE_SHARE, _WIDE_SHARE), scales, _FREEDOM)
+    root = np.linalg.cholesky(covariance)
+    share = np.array([1.0 - _WIDE_SHARE, _WIDE_SHARE])
+    return TMixture(share, np.stack([centre, centre]), np.stack([root, _WIDER * root]))
 
 
 def _weights(

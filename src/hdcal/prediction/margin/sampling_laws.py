@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 from scipy.special import softmax
 
-from hdcal.inference.importance import t_mixture
+from hdcal.inference.importance import TMixture
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
 _FREE, _SPREAD = 5.0, 1.3
@@ -39,8 +39,10 @@ class SamplingLaws:
             count: of the points.
             rng: source of randomness.
         """
-        scales = [(at, _SPREAD**2 * _wide(shape)) for at, shape in self.places]
-        law = t_mixture([1.0 / len(scales)] * len(scales), scales, _FREE)
+        centres, shapes = zip(*self.places, strict=True)
+        roots = [_SPREAD * np.linalg.cholesky(_wide(shape)) for shape in shapes]
+        even = np.full(len(centres), 1.0 / len(centres))
+        law = TMixture(even, np.stack(centres), np.stack(roots), _FREE)
         points = rng.normal(size=(count, len(self.counts)))
         log_law = -0.5 * np.sum(points[:, ~self.counts] ** 2, axis=1)
         points[:, self.counts] = law.draw(count, rng)
