@@ -64,6 +64,17 @@ def test_a_jump_of_the_deformation_is_a_new_zero(size):
     assert slope(found) == pytest.approx(STIFFNESS, rel=0.01)
 
 
+def test_a_jump_by_more_than_all_movements_is_found_at_a_turn_and_without_contact():
+    way = 1.0 - np.abs(np.linspace(0.0, 4.0, 401) % 2.0 - 1.0)
+    noise = np.random.default_rng(5).normal(0.0, 0.02, 401)
+    force = STIFFNESS * np.maximum(way - 0.3, 0.0) + noise
+    x = way + 3.0 * (np.arange(401) >= 200)
+    one = only(found := screen(x, force))
+    assert (one.kind, one.rows) == ("jump of the deformation", ((200, 200),))
+    assert one.size == pytest.approx(3.0, abs=0.03)
+    assert found.straight.slope == pytest.approx(STIFFNESS, rel=0.01)
+
+
 def test_a_gauge_zeroed_at_rest_begins_the_record():
     x, y = ramp()
     x, y = np.r_[np.full(30, -3.0), x], np.r_[np.zeros(30), y]

@@ -69,16 +69,13 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     branches = [rows[ends[i] : ends[i + 1] + 1] for i in largest[:_MOST_MOVEMENTS]]
     found = [longest_straight(one.x[b], one.y[b], one.scatter) for b in branches]
     pairs = list(zip(branches, found, strict=True))
+    height = [abs(float(one.y[b[-1]] - one.y[b[0]])) for b in branches]
+    large = [i for i, h in enumerate(height) if h >= _LARGE * height[0]]
     if largest.size >= _CYCLES:
-        shown = [(b, s) for b, s in pairs if b.size >= _SHOWN]
-        pairs = [(b, s) for b, s in shown if s.whole]
-        if 2 * len(shown) < len(branches):
-            return None
+        pairs = [(b, s) for b, s in pairs if s.whole and b.size >= _SHOWN]
         if 2 * len(pairs) < len(branches):
-            return _parallel_part(one, shown, n)
+            return _parallel_part(one, [(branches[i], found[i]) for i in large], n)
     else:
-        height = [abs(float(one.y[b[-1]] - one.y[b[0]])) for b in branches]
-        large = [i for i, h in enumerate(height) if h >= _LARGE * height[0]]
         pairs = [pairs[min(large, key=lambda i: branches[i][0])]]
     branch, straight = pairs[0]
     part = branch[straight.rows]
@@ -91,7 +88,9 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
 def _parallel_part(
     one: Run, movements: list[tuple[np.ndarray, "Straight"]], n: int
 ) -> StraightPart | None:
-    """Return what movements share of their straight parts, if these are parallel."""
+    """Return the range that straight parts of movements share, if they are parallel."""
+    if min(rows.size for rows, _ in movements) < _SHOWN:
+        return None
     # Of a gauge that trembles a range of readings is no range of the deformation.
     place = one.y if one.scatter else one.x
     ends = [place[rows[straight.rows]] for rows, straight in movements]
@@ -111,7 +110,8 @@ def _parallel_part(
     slope = float(weight @ slopes / weight.sum())
     if np.any(np.abs(slopes - slope) > np.maximum(_APART * sds, _ALIKE * abs(slope))):
         return None
-    rows = np.unique(np.concatenate(parts))
+    rows = one.distinct()
+    rows = rows[(place[rows] >= low) & (place[rows] <= high)]
     return _part_of(one, rows, n, (slope, float(weight.sum() ** -0.5)), whole=False)
 
 

@@ -71,7 +71,25 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
             row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
             if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
                 return jump
-    return None
+    return _beyond_all(x, y, scatter)
+
+
+def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
+    """Return a jump of one channel by more than its ranges before it and after it.
+
+    No movement explains it, wherever the part was: the other channel takes no part.
+    """
+    rows = np.arange(SIDE, x.size - SIDE)
+    longer = []
+    for values in (x, y):
+        ranges = [
+            np.maximum.accumulate(way) - np.minimum.accumulate(way)
+            for way in (values, values[::-1])
+        ]
+        most = np.maximum(ranges[0][rows - 1], ranges[1][::-1][rows])
+        longer.append(np.abs(values[rows] - values[rows - 1]) > most)
+    found = rows[longer[0] != longer[1]]
+    return _measured(x, y, int(found[0]), REACH, scatter) if found.size else None
 
 
 def _block(values: np.ndarray) -> int:
