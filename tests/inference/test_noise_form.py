@@ -47,9 +47,9 @@ def both_forms():
     places = {
         **base_places(rng),
         "deformation_offset": 0.02 * rng.normal(size=8),
-        "_added_sd": rng.normal(size=8),
+        "_noise_sd": rng.normal(size=8),
         CORRELATION: rng.normal(size=8),
-        f"_{noise}": 3.0 * rng.normal(size=8),
+        "_noise_growth": 3.0 * rng.normal(size=8),
     }
     return problem, [*names, CORRELATION, noise], places
 

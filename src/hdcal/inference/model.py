@@ -4,7 +4,7 @@ Sites whose names begin with "_" are coordinates of the sampler, not results. In
 of them the stated prior is exact.
 """
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 import jax.numpy as jnp
 import numpyro
@@ -25,6 +25,7 @@ from hdcal.physics.theory import Scalar
 
 CONTACT = "deformation_offset"
 SLACK = "seating_slack.clearance"
+GROWTH = "heteroscedastic_noise.share"
 
 
 def declare(problem: Problem) -> None:
@@ -141,24 +142,61 @@ def _sample_noise(problem: Problem, values: dict) -> None:
     before, σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of the
     part that grows with the force is divided by √(1 − ρ²).
     """
-    prior, added = problem.priors["sigma"], 1.0
+    prior, added, sampled = problem.priors["sigma"], 1.0, frozenset()
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
         added = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
+    growth = problem.priors.get(GROWTH, prior)
+    if GROWTH in problem.priors and "fixed" not in (prior.family, growth.family):
+        _sample_growing_noise(problem, values, added)
+        sampled = frozenset({GROWTH})
+    elif problem.correlated:
         values["sigma"] = sample_moved("sigma", prior, "_added_sd", added)
     else:
         values["sigma"] = sample_site("sigma", prior)
     for effect in problem.effects:
         if effect.stage == "noise":
-            _sample_effect(problem, effect, values, added)
+            _sample_effect(problem, effect, values, added, sampled)
+
+
+def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None:
+    """Sample σ and the share s of the load L in the noise by the noise at a usual load.
+
+    The readings determine √(σ² + s² L²) √(1 − ρ²), and hardly the part φ of its square
+    that grows: the logarithm of the one and the log odds of the other are the
+    coordinates. Their logistic densities are divided out.
+    """
+    size = jnp.sqrt(_mean_square(problem, problem.rows.deformation))
+    load = stiffness(problem, values) * size
+    logistic = dist.Logistic(0.0, 1.0)
+    log_sd = numpyro.sample("_noise_sd", logistic)
+    odds = numpyro.sample("_noise_growth", logistic)
+    sd = jnp.exp(log_sd) / added
+    log_shares = log_sigmoid(-odds), log_sigmoid(odds)
+    values["sigma"] = numpyro.deterministic("sigma", sd * jnp.exp(log_shares[0] / 2.0))
+    share = sd * jnp.exp(log_shares[1] / 2.0) / load
+    values[GROWTH] = numpyro.deterministic(GROWTH, share)
+    log_jacobian = 2.0 * jnp.log(sd) + 0.5 * sum(log_shares) - jnp.log(2.0 * load)
+    log_prior = sum(
+        distribution(problem.priors[name], name).log_prob(values[name])
+        for name in ("sigma", GROWTH)
+    )
+    drawn = logistic.log_prob(log_sd) + logistic.log_prob(odds)
+    numpyro.factor("_noise_prior", log_prior + log_jacobian - drawn)
 
 
 def _sample_effect(
-    problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
+    problem: Problem,
+    effect: type[Effect],
+    values: dict,
+    over: Scalar = 1.0,
+    sampled: Container[str] = (),
 ) -> None:
     """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
+        if name in sampled:
+            continue
         unit = problem.units.get(name)
         unit = None if unit is None else unit / over
         values[name] = sample_amplitude(name, problem.priors[name], unit)
