@@ -172,17 +172,17 @@ def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None
     log_sd = numpyro.sample("_noise_sd", logistic)
     odds = numpyro.sample("_noise_growth", logistic)
     sd = jnp.exp(log_sd) / added
-    log_shares = log_sigmoid(-odds), log_sigmoid(odds)
-    values["sigma"] = numpyro.deterministic("sigma", sd * jnp.exp(log_shares[0] / 2.0))
-    share = sd * jnp.exp(log_shares[1] / 2.0) / load
+    steady, grows = log_sigmoid(jnp.negative(odds)), log_sigmoid(odds)
+    values["sigma"] = numpyro.deterministic("sigma", sd * jnp.exp(steady / 2.0))
+    share = sd * jnp.exp(grows / 2.0) / load
     values[GROWTH] = numpyro.deterministic(GROWTH, share)
-    log_jacobian = 2.0 * jnp.log(sd) + 0.5 * sum(log_shares) - jnp.log(2.0 * load)
+    log_jacobian = 2.0 * jnp.log(sd) + 0.5 * (steady + grows) - jnp.log(2.0 * load)
     log_prior = sum(
         distribution(problem.priors[name], name).log_prob(values[name])
         for name in ("sigma", GROWTH)
     )
-    drawn = logistic.log_prob(log_sd) + logistic.log_prob(odds)
-    numpyro.factor("_noise_prior", log_prior + log_jacobian - drawn)
+    drawn = logistic.log_prob(jnp.stack([log_sd, odds]))
+    numpyro.factor("_noise_prior", log_prior + log_jacobian - jnp.sum(drawn))
 
 
 def _sample_effect(

@@ -1,5 +1,7 @@
 """Single channels: a clock that is reset, saturation, a gauge that trembles."""
 
+from typing import Any
+
 import numpy as np
 from scipy.stats import norm, wilcoxon
 
@@ -128,7 +130,7 @@ def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
         return 0.0
     # Without scatter the parts lie about zero. Neighbouring second differences share
     # readings: half of them are independent.
-    found = wilcoxon(parts, alternative="greater", method="asymptotic")
+    found: Any = wilcoxon(parts, alternative="greater", method="asymptotic")
     clear = float(found.zstatistic) > np.sqrt(2.0) * norm.isf(_LEVEL)
     # of scatter they alternate (-2/3), of a smooth movement they do not
     alternates = np.mean(bend_x[1:] * bend_x[:-1]) < -_ALTERNATES * np.mean(bend_x**2)
