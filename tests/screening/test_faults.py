@@ -75,6 +75,18 @@ def test_a_jump_by_more_than_all_movements_is_found_at_a_turn_and_without_contac
     assert found.straight.slope == pytest.approx(STIFFNESS, rel=0.01)
 
 
+@pytest.mark.parametrize("rows", [12, 20, 60])
+def test_noise_about_one_level_has_no_jump(rows):
+    rng = np.random.default_rng(rows)
+    x = np.linspace(0.0, 1.0, rows)
+    kinds = {
+        one.kind
+        for _ in range(300)
+        for one in screen(x, rng.normal(0.0, 1.0, rows)).observations
+    }
+    assert not [kind for kind in kinds if "jump" in kind]
+
+
 def test_a_gauge_zeroed_at_rest_begins_the_record():
     x, y = ramp()
     x, y = np.r_[np.full(30, -3.0), x], np.r_[np.zeros(30), y]

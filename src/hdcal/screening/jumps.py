@@ -23,6 +23,9 @@ _KNOWN = 5.0
 _REAL = 0.2
 # Movements over this share of the range make a cycle, in so many of which a zero shows.
 _CYCLE, _CYCLES = 0.1, 3
+# A step that no movement explains is so many times as long as the larger range, or
+# noise about one level would show some.
+_BEYOND = 1.75
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,7 @@ def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
             for way in (values, values[::-1])
         ]
         most = np.maximum(ranges[0][rows - 1], ranges[1][::-1][rows])
-        longer.append(np.abs(values[rows] - values[rows - 1]) > most)
+        longer.append(np.abs(values[rows] - values[rows - 1]) > _BEYOND * most)
     found = rows[longer[0] != longer[1]]
     return _measured(x, y, int(found[0]), REACH, scatter) if found.size else None
 
