@@ -68,7 +68,7 @@ def quoted(name: str) -> str:
     return f"'{_shown(name, _LONGEST_NAME)}'"
 
 
-def listed(items: Sequence[object], most: int) -> str:
+def shortened(items: Sequence[object], most: int) -> str:
     """Return the first items, and how many more there are: 'a, b and 3 more'."""
     more = len(items) - most
     first = ", ".join(str(item) for item in items[:most])

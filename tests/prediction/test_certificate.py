@@ -14,13 +14,13 @@ from commands import Hdcal
 from posteriors import batch, single, stiffer
 
 import hdcal
-from hdcal.data.versions import versions
 from hdcal.errors import NotUsable
 from hdcal.inference.checks import Check
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.certificate import certificate_page
 from hdcal.prediction.margin.summary import margin_answer, margin_report
 from hdcal.report.table_files import columns_csv
+from hdcal.versions import versions
 
 ISSUED = date(2026, 11, 22)
 ASKED = {"limit_force": 90.0}

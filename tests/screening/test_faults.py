@@ -220,6 +220,13 @@ def test_few_rows_show_a_gauge_that_trembles_much():
     assert found >= 18
 
 
+def test_computed_cycles_without_any_error_share_a_part():
+    """Multiples of 1/64 leave not even rounding."""
+    way = 1.0 - np.abs(np.arange(385) / 64.0 % 2.0 - 1.0)
+    part = screen(way, STIFFNESS * np.maximum(way - 0.25, 0.0)).straight
+    assert part.slope == pytest.approx(STIFFNESS, rel=1e-9) and not part.whole
+
+
 def test_runs_are_screened_by_themselves():
     x, y = ramp(50)
     wild = y.copy()

@@ -10,7 +10,6 @@ from structures import form_of
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior, effect_priors
-from hdcal.data.versions import versions
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.posterior import STRUCTURE, Posterior
@@ -19,6 +18,7 @@ from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
+from hdcal.versions import versions
 
 CHAINS = 2
 DRIFTS = ("thermal_zero_drift", "thermal_expansion")

@@ -5,14 +5,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.screening.result import LEAST_DIFFERENCE, NORMAL_95, StraightPart
+from hdcal.screening.result import (
+    LEAST_DIFFERENCE,
+    MACHINE_CLASS,
+    NORMAL_95,
+    StraightPart,
+)
 
 if TYPE_CHECKING:
     from hdcal.inference.checks import Check
-
-# A testing machine of class 0.5 may err by this share of the force (ISO 7500-1): a
-# curve that bends by less is a straight line.
-_CLASS = 0.005
 
 
 def takes_straight_part(case: Case) -> bool:
@@ -27,7 +28,7 @@ def takes_straight_part(case: Case) -> bool:
     if found is None or found.working_range or part is None or not np.ptp(x):
         return False
     slope = float(np.polyfit(x, case.records.force, 1)[0])
-    return abs(slope - part.slope) > _unsure(part, _CLASS)
+    return abs(slope - part.slope) > _unsure(part, MACHINE_CLASS)
 
 
 def straight_check(case: Case, stiffness: np.ndarray) -> "Check":

@@ -9,7 +9,6 @@ from pydantic import Field, computed_field
 from hdcal.comparison.charts import stiffness_chart
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
-from hdcal.data.versions import versions
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.engine.causes import Cause, causes_of
 from hdcal.prediction.engine.models import Models
@@ -26,6 +25,7 @@ from hdcal.report.item import (
 )
 from hdcal.report.result import Result
 from hdcal.report.words import label
+from hdcal.versions import versions
 
 # Draws of each result that are compared with those of the others.
 _DRAWS = 4000

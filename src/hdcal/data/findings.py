@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
-from hdcal.errors import Finding, Findings, InputError, listed, quoted
+from hdcal.errors import Finding, Findings, InputError, quoted, shortened
 
 LISTED = 20  # findings that one answer lists
 _ROWS = 6  # rows that one sentence lists
@@ -13,7 +13,7 @@ _CELL = re.compile(r"'[^']*'")
 
 def row_list(rows: Sequence[int]) -> str:
     """Return a text such as 'rows 3, 5, 9 and 12 more'."""
-    return f"row{'' if len(rows) == 1 else 's'} {listed(rows, _ROWS)}"
+    return f"row{'' if len(rows) == 1 else 's'} {shortened(rows, _ROWS)}"
 
 
 class FileFindings(Findings):

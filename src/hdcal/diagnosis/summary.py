@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict, Which
@@ -21,6 +20,7 @@ from hdcal.report.chart_spec import Chart
 from hdcal.report.intervals import INTERVAL, Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
+from hdcal.versions import versions
 
 
 def verdict_answer(verdict: Verdict) -> VerdictAnswer:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from hdcal.data.gear_file.validation import within
 from hdcal.data.theory_names import Theory
-from hdcal.data.versions import versions
 from hdcal.fleets.typed_json import STRICT, Count, Number, Size, typed
 from hdcal.inference.checks import Check
 from hdcal.quantities import BY_LOAD, FORCE, Quantities
+from hdcal.versions import versions
 
 if TYPE_CHECKING:
     from hdcal.fleets.fleet import Fleet

@@ -7,8 +7,7 @@ from itertools import compress
 import numpy as np
 
 from hdcal.data.theory_names import SPRING
-from hdcal.data.versions import versions
-from hdcal.errors import listed
+from hdcal.errors import shortened
 from hdcal.evidence.prepare import moments
 from hdcal.fleets.answer import (
     FleetAnswer,
@@ -34,6 +33,7 @@ from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.report.document import mapped
 from hdcal.report.intervals import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
+from hdcal.versions import versions
 
 # Ends and middle of an interval.
 _ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
@@ -216,11 +216,11 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
     far = np.array(found.case.specimen_labels)[_in_another_unit(found)].tolist()
     if far:
         parts.append(
-            f"See in which units {listed(far, 1)} was read: not in the others'"
+            f"See in which units {shortened(far, 1)} was read: not in the others'"
         )
     if again := [name for name in called if name not in {*with_more, *far}]:
         words = "anew and measure again before you act on this"
-        parts.append(f"Mount {listed(again, 1)} {words}")
+        parts.append(f"Mount {shortened(again, 1)} {words}")
     misfit = found.misfit
     beside = misfit.loop_N or misfit.bend_N or misfit.correlation
     if beside or bent.any():

@@ -10,7 +10,6 @@ import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
-from hdcal.data.versions import versions
 from hdcal.exported import jit
 from hdcal.inference.checks import (
     Check,
@@ -30,6 +29,7 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import previous_rows
+from hdcal.versions import versions
 
 _PRIOR_DRAWS = 2000
 # The log likelihood of every row and draw is not kept above this many numbers.

@@ -4,7 +4,7 @@ Sites whose names begin with "_" are coordinates of the sampler, not results. In
 of them the stated prior is exact.
 """
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpyro
@@ -142,21 +142,20 @@ def _sample_noise(problem: Problem, values: dict) -> None:
     before, σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of the
     part that grows with the force is divided by √(1 − ρ²).
     """
-    prior, added, sampled = problem.priors["sigma"], 1.0, frozenset()
+    prior, added = problem.priors["sigma"], 1.0
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
         added = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
     growth = problem.priors.get(GROWTH, prior)
     if GROWTH in problem.priors and "fixed" not in (prior.family, growth.family):
         _sample_growing_noise(problem, values, added)
-        sampled = frozenset({GROWTH})
     elif problem.correlated:
         values["sigma"] = sample_moved("sigma", prior, "_added_sd", added)
     else:
         values["sigma"] = sample_site("sigma", prior)
     for effect in problem.effects:
         if effect.stage == "noise":
-            _sample_effect(problem, effect, values, added, sampled)
+            _sample_effect(problem, effect, values, added)
 
 
 def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None:
@@ -186,16 +185,15 @@ def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None
 
 
 def _sample_effect(
-    problem: Problem,
-    effect: type[Effect],
-    values: dict,
-    over: Scalar = 1.0,
-    sampled: Container[str] = (),
+    problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
-    """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
+    """Sample the parameters of an effect that have no value yet.
+
+    `over` divides the unit of amplitudes.
+    """
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
-        if name in sampled:
+        if name in values:
             continue
         unit = problem.units.get(name)
         unit = None if unit is None else unit / over

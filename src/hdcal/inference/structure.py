@@ -84,11 +84,15 @@ def decide_structure(
         pilot: fit of these records, where there is one.
     """
     noise_sd = (pilot or pilot_fit(case.records)).noise_sd
-    rounded = _needs_exact_rounding(case, effects, noise_sd, bool(with_gap))
-    reason = _why_independent(case, effects, rounded)
     # What the gear file states of the correlation is in the model.
     is_stated = case.gear.scale_priors[CORRELATION].family != "uniform"
-    ties = (False,) if reason else (True,) if is_stated else _EITHER
+
+    def considered(rounded: bool) -> tuple[str, tuple[bool, ...]]:
+        reason = _why_independent(case, effects, rounded)
+        return reason, (False,) if reason else (True,) if is_stated else _EITHER
+
+    rounded = _needs_exact_rounding(case, effects, noise_sd, bool(with_gap))
+    reason, ties = considered(rounded)
     if with_gap is None and (effects or not _may_bend(case)):
         with_gap = False
     gaps = _EITHER if with_gap is None else (with_gap,)
@@ -96,8 +100,8 @@ def decide_structure(
     coarse = _needs_exact_rounding(case, effects, noise_sd, gap)
     if coarse != rounded:
         # Beside a leftover the steps are taken for noise, which may be correlated.
-        rounded, reason = coarse, _why_independent(case, effects, coarse)
-        ties = (False,) if reason else (True,) if is_stated else _EITHER
+        rounded = coarse
+        reason, ties = considered(rounded)
         gap, tied = _best_form(case, bool(effects), (gap,), ties)
     if not (reason or tied):
         reason = NONE_SHOWN

@@ -5,7 +5,13 @@ import math
 import numpy as np
 
 from hdcal.screening.channels import HIDDEN
-from hdcal.screening.result import HOLDING, LOADING, UNLOADING, StraightPart
+from hdcal.screening.result import (
+    HOLDING,
+    LOADING,
+    MACHINE_CLASS,
+    UNLOADING,
+    StraightPart,
+)
 from hdcal.screening.run import Run
 from hdcal.screening.straight_pieces import (
     SHOWN,
@@ -25,8 +31,10 @@ _BOTH_SIDES = 0.5
 # A hold has so many times as many rows of one reading as a movement.
 _HOLD = 3.0
 # Movements share a straight part from this share of the longest one on; it is parallel
-# where slopes differ by no more than so many standard errors, or by this share.
-_SHARED, _APART, _ALIKE = 0.5, 3.0, 0.005
+# where slopes differ by no more than so many standard errors.
+_SHARED, _APART = 0.5, 3.0
+# Share of a slope that is the digits of computed readings.
+_DIGITS = 1e-9
 # A movement is large from this share of the largest force on.
 _LARGE = 0.5
 
@@ -109,9 +117,10 @@ def _parallel_part(
     slopes, sds = np.transpose(
         [_slope(one, part, wide) for part, wide in zip(parts, inflations, strict=True)]
     )
-    weight = 1.0 / np.maximum(sds, 1e-300) ** 2
+    weight = 1.0 / np.maximum(sds, _DIGITS * np.abs(slopes)) ** 2
     slope = float(weight @ slopes / weight.sum())
-    if np.any(np.abs(slopes - slope) > np.maximum(_APART * sds, _ALIKE * abs(slope))):
+    unsure = np.maximum(_APART * sds, MACHINE_CLASS * abs(slope))
+    if np.any(np.abs(slopes - slope) > unsure):
         return None
     rows = one.distinct()
     rows = rows[(place[rows] >= low) & (place[rows] <= high)]

@@ -41,6 +41,9 @@ LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE, REPEATED =
 # Share by which stiffnesses differ at least: less matters to nobody, however well both
 # are known.
 LEAST_DIFFERENCE = 0.1
+# A testing machine of class 0.5 may err by this share of the force (ISO 7500-1): a
+# curve that bends by less is a straight line, and slopes that differ by less are one.
+MACHINE_CLASS = 0.005
 # Half a 95 % interval of a normal distribution, in sds.
 NORMAL_95 = 1.96
 # First and last row of each stretch of rows.

@@ -21,6 +21,8 @@ _PARAMETERS = 3.0
 # Share of a piece that is left out where it meets another one: the place of a cut is
 # known to some points only, and a curve that bends gradually has none.
 _MARGIN = 0.1
+# Share of the readings that is no more than rounding of what was computed.
+_DIGITS = 1e-9
 # Points from which on noise that remembers can be told from a kink: ten for each piece.
 _FEWEST_FOR_MEMORY = 10 * _PIECES
 
@@ -156,7 +158,9 @@ def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int], *, both: bool) ->
     pieces = [(a, b) for a, b in pairwise(edges) if b > a]
     left = np.concatenate([_left(x[a:b], y[a:b], both=both) for a, b in pieces])
     square = float(left @ left)
-    r = float(left[1:] @ left[:-1]) / square if square else 0.0
+    if square <= _DIGITS**2 * float(x @ x + y @ y):
+        return 1.0
+    r = float(left[1:] @ left[:-1]) / square
     # Two parameters a piece make the residuals of independent noise alternate.
     r += 2.0 * len(pieces) / x.size
     r = min(max(r, 0.0), 1.0 - 1.0 / x.size)
@@ -166,8 +170,8 @@ def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int], *, both: bool) ->
 def _left(x: np.ndarray, y: np.ndarray, *, both: bool) -> np.ndarray:
     """Return what a line leaves of some points; across it where both scatter."""
     x, y = x - x.mean(), y - y.mean()
-    if both:
-        across = np.linalg.svd(np.column_stack([x, y]), full_matrices=True)[2][1]
-        return across[0] * x + across[1] * y
     square = float(x @ x)
+    if both:
+        angle = 0.5 * np.arctan2(2.0 * (x @ y), square - y @ y)
+        return y * np.cos(angle) - x * np.sin(angle)
     return y - x * (float(x @ y) / square) if square else y

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from hdcal.data.measurements.bad_gears import left_out_words
-from hdcal.data.versions import versions
 from hdcal.diagnosis.naming import naming
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.fleets.left_out import left_out_of, with_left_out
@@ -17,6 +16,7 @@ from hdcal.report.write import Report
 from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause
 from hdcal.shared_causes.causes import TOLD, FleetCauses
 from hdcal.shared_causes.document import causes_document, headline
+from hdcal.versions import versions
 
 
 def cause_columns(found: FleetCauses) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.errors import Finding, listed, quoted
+from hdcal.errors import Finding, quoted, shortened
 
 _LISTED = 3
 
@@ -44,7 +44,7 @@ def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     """
     words = f"{len(bad)} of the gears read so far"
     words = words if many is None else f"{len(bad)} of {many} gears"
-    words += f" {_be(bad)} bad: {listed([*map(quoted, bad)], _LISTED)}"
+    words += f" {_be(bad)} bad: {shortened([*map(quoted, bad)], _LISTED)}"
     remedy = "Ask for it to leave such gears out, whole, and have the others answered"
     return Finding("skip_bad", words, remedy)
 
@@ -53,7 +53,7 @@ def left_out_words(left_out: Mapping[str, Finding], many: int) -> str:
     """Return which gears of many are left out, and why."""
     each = [f"{gear} ({cause(why)})" for gear, why in left_out.items()]
     words = f"{len(left_out)} of {many} gears {_be(left_out)} left out"
-    return f"{words}: {listed(each, _LISTED)}."
+    return f"{words}: {shortened(each, _LISTED)}."
 
 
 def cause(finding: Finding) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from hdcal.errors import Finding, InputError, listed, quoted
+from hdcal.errors import Finding, InputError, quoted, shortened
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 # Tables of readings by their names. A text may be a remark: it counts as one only where
@@ -77,5 +77,5 @@ def not_read(files: Sequence[Path], folder: Path) -> Iterator[str]:
     inside = sorted(one.name for one in folder.iterdir())
     others = [one for one in inside if one not in known and not one.startswith(".")]
     if others:
-        names = listed(others, _LISTED)
+        names = shortened(others, _LISTED)
         yield f"not read, as it is no table and no folder with a {DATA_NAME}: {names}"

@@ -26,7 +26,7 @@ from hdcal.data.tables.headers import QUANTITIES
 from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
-from hdcal.errors import Finding, listed, quoted
+from hdcal.errors import Finding, quoted, shortened
 from hdcal.quantities import FORCE, TORQUE, Quantities
 
 # Labels that one finding names.
@@ -239,7 +239,7 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     findings, (_, names) = FileFindings(measured.file), measured.gears
     name = quoted(label)
     if label not in names:
-        remedy = f"There are {listed([*map(quoted, names)], _LISTED)}"
+        remedy = f"There are {shortened([*map(quoted, names)], _LISTED)}"
         if len(names) == 1:
             remedy = "Say `columns` 'specimen=HEADER', which names them"
         findings.refuse(f"no specimen is called {name}", remedy)

@@ -243,9 +243,8 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
         find("deformation", problem, "Give it in mm")
     else:
         findings += far_findings(worst, float(np.max(np.abs(tested))), unit=unit)
-        loads = _loading(deformation, case.records)
-        sense = loads if direction is None else 0.0 * loads + SENSE.get(direction, 0.0)
-        pairs = zip(deformation, sense, strict=True)
+        sense = SENSE.get(direction, _loading(deformation, case.records))
+        pairs = np.broadcast(deformation, sense)
         each = (excluded_findings(case, *pair) for pair in pairs)
         findings += next(filter(None, each), [])
     if temperature.size == 0:
@@ -266,17 +265,14 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
     a room's) and per direction that was tested.
 
     Args:
-        models: a posterior, or several with the probabilities of their models, over
-            which the bands average.
+        models: a posterior, or several with probabilities, over which bands average.
         interval: probability inside the bands.
     """
     case = causes_of(models, allow_failed=True)[0].posterior.case
     records, nominal = case.records, case.gear.nominal_deformation
     ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
-    if not lies_far(records):
-        ends.append(0.0)
-    if nominal is not None:
-        ends.append(nominal)
+    ends += [] if lies_far(records) else [0.0]
+    ends += [] if nominal is None else [nominal]
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
     # Not beyond an end that is the unloaded gear and no tested deformation.
@@ -284,9 +280,8 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
     for left, right in case.excluded:
         low, high = (low, left) if left >= ends[1] else (right, high)
     ends = [end for end in ends if low <= end <= high]
-    grid = np.linspace(low, high, 67)
-    # The ends of the data themselves, so that the tested range shows whole.
-    grid = np.union1d(grid, ends)
+    # With the ends of the data themselves, so that the tested range shows whole.
+    grid = np.union1d(np.linspace(low, high, 67), ends)
     cold, warm = np.min(records.temperature), np.max(records.temperature)
     # Rounded together, but never out of what was measured.
     levels = np.unique(np.clip(np.round(records.temperature, 1), cold, warm))

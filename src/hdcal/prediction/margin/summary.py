@@ -5,7 +5,6 @@ from datetime import date
 
 import numpy as np
 
-from hdcal.data.versions import versions
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
 from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
@@ -14,6 +13,7 @@ from hdcal.prediction.margin.sentences import answer, headline, next_steps
 from hdcal.prediction.margin.stated import BudgetLine
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report
+from hdcal.versions import versions
 
 KINDS = {
     "force_N": "mean of the population, equal-tailed credible interval",
