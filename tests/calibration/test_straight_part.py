@@ -131,10 +131,13 @@ def test_the_first_loading_is_taken_and_the_other_branch_is_not_predicted():
     x = np.asarray(case.records.deformation)
     assert x[0] == 0.0 and x[-1] == pytest.approx(0.9, abs=0.03)
     assert case.excluded_sense == 0  # the unloading lies elsewhere
-    # Of a friction loop both branches lie between the ends.
+    # Of a loop both branches lie between the ends: parallel ones are one part.
     x, y = toe(contact=0.0)
     y[:30] -= 10.0 * np.linspace(1.0, 0.0, 30)
     back = 80.0 * x[::-1] - 8.0
+    both = read(np.r_[x, x[-2::-1]], np.r_[y, back[1:]], range="straight")
+    assert both.excluded_sense == 0 and {*np.asarray(both.records.sense)} == {-1, 1}
+    back = 70.0 * x[::-1] + 2.0
     case = read(np.r_[x, x[-2::-1]], np.r_[y, back[1:]], range="straight")
     assert case.excluded_sense == -1 and "of one branch" in case.notes[-1]
     posterior = hdcal.calibrate(case, warmup=300, draws=500)

@@ -62,14 +62,14 @@ def name_segments(one: Run) -> None:
 
 
 def straight_part(one: Run, n: int) -> StraightPart | None:
-    """Return the longest straight part of a run's first large movement.
+    """Return the longest straight part of a run.
 
-    That is the loading, as testing standards have it. Of cycles it is the largest
-    movement that is straight as a whole, where at least half of them are: a part that
-    yields once goes back and forth along another line. Where they are not, but are
-    parallel over a range that they share, it is that range of all of them. In a loop
-    none is straight, and the stiffness is that of all of it. Rows that only repeat a
-    reading add nothing.
+    Of cycles it is the largest movement that is straight as a whole, where at least
+    half of them are: a part that yields once goes back and forth along another line.
+    Else it is the range that the straight parts of all large movements share, if they
+    are parallel there; or else that of the first one, the loading, as testing standards
+    have it. In cycles of a loop nothing is straight, and the stiffness is that of all
+    of it. Rows that only repeat a reading add nothing.
     """
     rows = one.distinct()
     if rows.size < _FEWEST:
@@ -79,16 +79,20 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     largest = np.argsort(-np.abs(np.diff(one.y[rows[ends]])), kind="stable")
     branches = [rows[ends[i] : ends[i + 1] + 1] for i in largest[:_MOST_MOVEMENTS]]
     found = [longest_straight(one.x[b], one.y[b], one.scatter) for b in branches]
-    pairs = list(zip(branches, found, strict=True))
     height = [abs(float(one.y[b[-1]] - one.y[b[0]])) for b in branches]
     large = [i for i, h in enumerate(height) if h >= _LARGE * height[0]]
-    if largest.size >= _CYCLES:
-        pairs = [(b, s) for b, s in pairs if s.whole and b.size >= SHOWN]
-        if 2 * len(pairs) < len(branches):
-            return _parallel_part(one, [(branches[i], found[i]) for i in large], n)
+    shown = [i for i, b in enumerate(branches) if found[i].whole and b.size >= SHOWN]
+    if largest.size >= _CYCLES and 2 * len(shown) >= len(branches):
+        first = shown[0]
+    elif not all(found[i].whole for i in large) and (
+        part := _parallel_part(one, [(branches[i], found[i]) for i in large], n)
+    ):
+        return part
+    elif largest.size >= _CYCLES:
+        return None
     else:
-        pairs = [pairs[min(large, key=lambda i: branches[i][0])]]
-    branch, straight = pairs[0]
+        first = min(large, key=lambda i: branches[i][0])
+    branch, straight = branches[first], found[first]
     part = branch[straight.rows]
     if not np.ptp(one.x[part]):
         return None
@@ -100,7 +104,7 @@ def _parallel_part(
     one: Run, movements: list[tuple[np.ndarray, Straight]], n: int
 ) -> StraightPart | None:
     """Return the range that straight parts of movements share, if they are parallel."""
-    if min(rows.size for rows, _ in movements) < SHOWN:
+    if len(movements) < 2 or min(rows.size for rows, _ in movements) < SHOWN:
         return None
     # Of a gauge that trembles a range of readings is no range of the deformation.
     place = one.y if one.scatter else one.x
