@@ -87,6 +87,37 @@ def test_noise_about_one_level_has_no_jump(rows):
     assert not [kind for kind in kinds if "jump" in kind]
 
 
+def contact_cycles(seed=0, friction=0.0, play=0.0):
+    """Three cycles of 50 N/mm to 10 mm with contact from 3 mm on, 600 rows.
+
+    Friction turns, and play is taken up, within one row after a turn.
+    """
+    rng = np.random.default_rng(seed)
+    x = 10.0 * (1.0 - np.abs(np.linspace(0.0, 6.0, 600) % 2.0 - 1.0))
+    way = np.sign(np.gradient(x))
+    force = 50.0 * np.maximum(x - 3.0, 0.0) + friction * way * (x > 3.0)
+    x = x + 0.5 * play * way + rng.normal(0.0, 0.003, 600)
+    return x, force + rng.normal(0.0, 0.2, 600)
+
+
+@pytest.mark.parametrize("size", [2.0, -2.0])
+@pytest.mark.parametrize("row", [200, 297, 300, 303, 340, 400])
+def test_a_jump_between_cycles_is_found_at_a_turn_and_before_contact(row, size):
+    x, force = contact_cycles()
+    x[row:] += size
+    one = only(found := screen(x, force))
+    assert (one.kind, one.rows) == ("jump of the deformation", ((row, row),))
+    assert one.size == pytest.approx(size, abs=0.15)
+    assert found.straight.slope == pytest.approx(50.0, rel=0.003)
+
+
+@pytest.mark.parametrize("play", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("friction", [0.0, 5.0, 30.0])
+def test_friction_and_play_within_one_row_are_no_jumps(friction, play):
+    found = screen(*contact_cycles(friction=friction, play=play))
+    assert not [one for one in found.observations if "jump" in one.kind]
+
+
 def test_a_gauge_zeroed_at_rest_begins_the_record():
     x, y = ramp()
     x, y = np.r_[np.full(30, -3.0), x], np.r_[np.zeros(30), y]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.screening.local_fit import REACH, resolution
-from hdcal.screening.possible_jumps import SIDE, possible_jumps
+from hdcal.screening.local_fit import REACH, looked_at, resolution, spread
+from hdcal.screening.possible_jumps import LEAST, SIDE, off_sequence, possible_jumps
 from hdcal.screening.turning_points import noise_sd, turning_points
 
 # Places that are tried.
@@ -74,7 +74,28 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
             row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
             if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
                 return jump
-    return _beyond_all(x, y, scatter)
+    return _between_cycles(x, y, scatter) or _beyond_all(x, y, scatter)
+
+
+def _between_cycles(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
+    """Return a jump at a turn or without load, which moves the cycles after it.
+
+    One channel leaves its own sequence there. The curve does not tell where it goes on,
+    but the movements next to it do.
+    """
+    rows = looked_at(x, y)
+    rows = rows[(rows >= SIDE) & (rows <= x.size - SIDE)]
+    if not rows.size:
+        return None
+    off_x, off_y = off_sequence(x, rows), off_sequence(y, rows)
+    least_x, least_y = LEAST * spread(x), LEAST * spread(y)
+    for row in rows[off_x != off_y][:_TRIED].tolist():
+        jump = _jump(x, y, row, REACH, scatter, fewest_turns=_CYCLES)
+        if jump is None:
+            continue
+        if abs(jump.deformation) > least_x or abs(jump.force) > least_y:
+            return jump
+    return None
 
 
 def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
@@ -115,7 +136,12 @@ def _sharpest(x: np.ndarray, y: np.ndarray, near: np.ndarray) -> int:
 
 
 def _jump(
-    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+    x: np.ndarray,
+    y: np.ndarray,
+    row: int,
+    reach: int,
+    scatter: float,
+    fewest_turns: int = 0,
 ) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it.
 
@@ -125,6 +151,7 @@ def _jump(
         row: the first one after it.
         reach: rows on each side that tell its size.
         scatter: sd of the deformation's reading.
+        fewest_turns: of the whole movement.
     """
     jump = _measured(x, y, row, reach, scatter)
     after = np.arange(x.size) >= row
@@ -132,8 +159,8 @@ def _jump(
     # through the scatter of the deformation
     least = max(_CYCLE * float(np.ptp(level[0])), 10.0 * scatter)
     turns = turning_points(level[0], least)
-    real = _goes_on(*level, row, turns[0]) and _stays(*level, after, jump, turns)
-    return jump if real else None
+    real = turns[0].size >= fewest_turns and _goes_on(*level, row, turns[0])
+    return jump if real and _stays(*level, after, jump, turns) else None
 
 
 def _measured(

@@ -19,7 +19,7 @@ from hdcal.screening.turning_points import noise_sd
 # Rows needed on each side of a jump; from fewer it could be anything.
 SIDE = 4
 # A smaller jump, as a share of the tested range, is left to the model's noise.
-_LEAST = 0.02
+LEAST = 0.02
 # Slopes on both sides agree when they differ by less than this share.
 _ALIKE = 0.5
 # A window moves one way when this share of its way is progress.
@@ -95,17 +95,17 @@ def possible_jumps(x: np.ndarray, y: np.ndarray, scatter: float) -> np.ndarray:
     own, common = sides.gaps()
     gap = np.where(possible, _least_gap(sides, own, common), 0.0)
     usual = Usual.of(common[_elsewhere(rows, gap, possible)], resolution(y))
-    off = _off_sequence(x, rows) | _off_sequence(y, rows)
+    off = off_sequence(x, rows) | off_sequence(y, rows)
     # A channel that leaves its own sequence says where a jump is, if there is one.
     found = usual.surprised(gap, x.size)
     found |= off & usual.surprised(gap, max(int(off.sum()), 1))
-    found &= np.abs(gap) > _LEAST * spread(y)
+    found &= np.abs(gap) > LEAST * spread(y)
     found &= _alike(sides, usual.scale) & _in_one_step(x, y, rows, sides, gap)
     clearest = np.argsort(-np.where(found, np.abs(gap), 0.0))
     return rows[clearest[found[clearest]]]
 
 
-def _off_sequence(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def off_sequence(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Tell before which rows a channel steps as it does nowhere else about them."""
     steps = values[rows] - values[rows - 1]
     off = steps - median(windows(np.diff(values, prepend=values[0]), rows, _NEAR))
