@@ -284,3 +284,12 @@ def test_a_logger_that_is_faster_than_its_gauges_repeats_readings():
     # A hold at a few places is no such logger.
     held = np.r_[np.arange(40), np.full(60, 39)]
     assert not screen(x[held], y[held]).observations
+
+
+@pytest.mark.parametrize("rows", [5, 12, 50])
+@pytest.mark.parametrize("seed", range(5))
+def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
+    rng = np.random.default_rng(seed)
+    x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
+    found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
+    assert not [one for one in found.observations if "jump" in one.kind]

@@ -90,7 +90,7 @@ def _between_cycles(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None
     off_x, off_y = off_sequence(x, rows), off_sequence(y, rows)
     least_x, least_y = LEAST * spread(x), LEAST * spread(y)
     for row in rows[off_x != off_y][:_TRIED].tolist():
-        jump = _jump(x, y, row, REACH, scatter, fewest_turns=_CYCLES)
+        jump = _jump(x, y, row, REACH, scatter, in_cycles=True)
         if jump is None:
             continue
         if abs(jump.deformation) > least_x or abs(jump.force) > least_y:
@@ -141,7 +141,7 @@ def _jump(
     row: int,
     reach: int,
     scatter: float,
-    fewest_turns: int = 0,
+    in_cycles: bool = False,
 ) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it.
 
@@ -151,7 +151,7 @@ def _jump(
         row: the first one after it.
         reach: rows on each side that tell its size.
         scatter: sd of the deformation's reading.
-        fewest_turns: of the whole movement.
+        in_cycles: only where the record has cycles, of some rows each.
     """
     jump = _measured(x, y, row, reach, scatter)
     after = np.arange(x.size) >= row
@@ -159,7 +159,10 @@ def _jump(
     # through the scatter of the deformation
     least = max(_CYCLE * float(np.ptp(level[0])), 10.0 * scatter)
     turns = turning_points(level[0], least)
-    real = turns[0].size >= fewest_turns and _goes_on(*level, row, turns[0])
+    movements = turns[0].size + 1
+    if in_cycles and (movements <= _CYCLES or x.size < 2 * REACH * movements):
+        return None
+    real = _goes_on(*level, row, turns[0])
     return jump if real and _stays(*level, after, jump, turns) else None
 
 

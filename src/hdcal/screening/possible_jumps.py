@@ -95,10 +95,11 @@ def possible_jumps(x: np.ndarray, y: np.ndarray, scatter: float) -> np.ndarray:
     own, common = sides.gaps()
     gap = np.where(possible, _least_gap(sides, own, common), 0.0)
     usual = Usual.of(common[_elsewhere(rows, gap, possible)], resolution(y))
+    known = gap / _carried(x, y, rows, sides)
     off = off_sequence(x, rows) | off_sequence(y, rows)
     # A channel that leaves its own sequence says where a jump is, if there is one.
-    found = usual.surprised(gap, x.size)
-    found |= off & usual.surprised(gap, max(int(off.sum()), 1))
+    found = usual.surprised(known, x.size)
+    found |= off & usual.surprised(known, max(int(off.sum()), 1))
     found &= np.abs(gap) > LEAST * spread(y)
     found &= _alike(sides, usual.scale) & _in_one_step(x, y, rows, sides, gap)
     clearest = np.argsort(-np.where(found, np.abs(gap), 0.0))
@@ -136,6 +137,21 @@ def _in_one_step(
     with np.errstate(all="ignore"):
         others = np.nanmax(off, axis=1)
     return (step >= _ONE_STEP * np.abs(gap)) & (others <= _OTHERS * step)
+
+
+def _carried(
+    x: np.ndarray, y: np.ndarray, rows: np.ndarray, sides: Sides
+) -> np.ndarray:
+    """Return how many windows far both lines are carried on, 1 at least.
+
+    Where both channels go along the curve by more than a window reaches, the error of
+    its slope counts so many times.
+    """
+    run, rise = (np.abs(values[rows] - values[rows - 1]) for values in (x, y))
+    reach = np.minimum(*(_reach(each) for each in sides.x))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.fmin(run, rise / np.abs(sides.common))
+        return np.fmax(both / reach, 1.0)
 
 
 def _least_gap(sides: Sides, own: np.ndarray, common: np.ndarray) -> np.ndarray:
