@@ -171,3 +171,17 @@ def test_a_known_correlation_is_generalised_least_squares():
     t = fit[-1] / np.sqrt(cover[-1, -1] * (left @ inverse @ left) / 93)
     p = 2.0 * stats.t.sf(abs(t), 93) * len(data.shapes)
     assert found["direction"].p_value == pytest.approx(p, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_smoothing_the_deformation_leaves_no_shape_over_the_rows(seed):
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0.0, 2.0, 400)
+    readings = {
+        "displacement_mm": x + rng.normal(0.0, 0.12, 400),
+        "force_N": 120.0 * x + rng.normal(0.0, 0.2, 400),
+    }
+    case = read_case(readings)
+    assert case.screening is not None
+    assert case.screening.deformation_sd == pytest.approx(0.12, rel=0.1)
+    assert residuals(calibrate(case, **SHORT)).structure == ()

@@ -85,8 +85,18 @@ class _Test(NamedTuple):
     name: str
 
 
-def shapes_of(records: Records, reference_temperature: float) -> Shapes:
-    """Return the shapes to look for in the residuals of these records."""
+def shapes_of(
+    records: Records, reference_temperature: float, *, smoothed: bool = False
+) -> Shapes:
+    """Return the shapes to look for in the residuals of these records.
+
+    Args:
+        records: of the calibration.
+        reference_temperature: of the gear [°C].
+        smoothed: whether scatter was taken out of the deformation by smoothing it over
+            the rows. What the deformation leaves of the rows' order and time is then
+            the smoothed scatter, which is in the residuals too.
+    """
     deformation = np.asarray(records.deformation)
     scaled = deformation / np.max(np.abs(deformation))
     rise = np.asarray(records.temperature) - reference_temperature
@@ -122,6 +132,8 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
             "fall from the first row to the last",
         ),
     }
+    if smoothed:
+        del shapes["time"], shapes["order"]
     return {name: shape for name, shape in shapes.items() if np.ptp(shape[0]) > 0.0}
 
 

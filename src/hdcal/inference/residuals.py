@@ -135,7 +135,9 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
         pull.append(np.array([(mean - centre[name]) / prior_sd]))
     below = np.concatenate(pull)
     case = posterior.case
-    shapes = shapes_of(case.records, case.gear.reference_temperature)
+    smoothed = case.screening is not None and case.screening.deformation_sd > 0.0
+    reference = case.gear.reference_temperature
+    shapes = shapes_of(case.records, reference, smoothed=smoothed)
     return Whitened(
         residual=np.concatenate([residual / sd, below]),
         absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(below))]),
