@@ -11,6 +11,7 @@ from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run
 from hdcal.screening.sign import Sign, sign_of_slope
 from hdcal.screening.wild import FEWEST
+from hdcal.screening.working_range import WorkingRange
 
 # Rows from which the sign of a slope can be told.
 _FEWEST_FOR_SIGN = 5
@@ -23,6 +24,7 @@ def screen(
     run: np.ndarray | None = None,
     *,
     whole: bool = True,
+    wanted: WorkingRange | None = None,
 ) -> Screening:
     """Look at a record: what of it is no curve of a part, and what was done about it.
 
@@ -33,6 +35,8 @@ def screen(
         run: index of the mounting, shape (n,); by default one.
         whole: whether these are all runs. Of some of them nobody knows whether the sign
             is opposite in every run, so that it is asked about and not turned.
+        wanted: working range. Where force and deformation grow together in it, the sign
+            is the usual one.
     """
     x, y = np.array(deformation, float), np.array(force, float)
     n = x.size
@@ -47,7 +51,7 @@ def screen(
         one.plain = bool(plain[one.index])
         look_at(one)
         runs.append(one)
-    _signs(runs, whole=whole)
+    _signs(runs, wanted, whole=whole)
     for one in runs:
         name_segments(one)
     return _gathered(runs, n, clock_read)
@@ -78,12 +82,12 @@ def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
     )
 
 
-def _signs(runs: list[Run], *, whole: bool) -> None:
+def _signs(runs: list[Run], wanted: WorkingRange | None, *, whole: bool) -> None:
     """Turn the force where it is counted the other way in every run.
 
     What comes after the largest force is cut first: there the force falls.
     """
-    signs = [_sign(one) for one in runs]
+    signs = [_sign(one, wanted) for one in runs]
     turned = whole and {*signs} - {"unknown"} == {"opposite"}
     for one, sign in zip(runs, signs, strict=True):
         if sign == "same" or (sign == "unknown" and not turned):
@@ -97,7 +101,7 @@ def _signs(runs: list[Run], *, whole: bool) -> None:
             one.observe("negative slope", rows, slope, "N/mm", "asked")
 
 
-def _sign(one: Run) -> Sign:
+def _sign(one: Run, wanted: WorkingRange | None) -> Sign:
     """Tell how force and deformation go together until the force has dropped."""
     rows = one.distinct()
     if rows.size < _FEWEST_FOR_SIGN:
@@ -108,9 +112,13 @@ def _sign(one: Run) -> Sign:
     sign = sign_of_slope(x, y, one.scatter)
     if rows.size < FEWEST:
         return sign
+    inside = _inside(wanted, x, y)
     for way, expected in ((1.0, "same"), (-1.0, "opposite")):
+        stated = expected == "opposite" and not inside.all()
+        if stated and sign_of_slope(x[inside], y[inside], one.scatter) == "same":
+            return "same"
         found = rows_after_drop(x, way * y)
-        if found is None:
+        if found is None or inside[: found[0]].sum() < _FEWEST_FOR_SIGN:
             continue
         first, drop = found
         before = sign_of_slope(x[:first], y[:first], one.scatter)
@@ -120,6 +128,15 @@ def _sign(one: Run) -> Sign:
             one.observe("after the largest force", after, way * drop, "N", "cut")
             return before
     return sign
+
+
+def _inside(wanted: WorkingRange | None, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Tell which rows lie within stated deformations; all where hardly one does."""
+    if wanted is not None and wanted.unit == "mm":
+        inside = wanted.inside(x, y)
+        if inside.sum() >= _FEWEST_FOR_SIGN:
+            return inside
+    return np.ones(x.size, bool)
 
 
 def _rough_slope(x: np.ndarray, y: np.ndarray) -> float:

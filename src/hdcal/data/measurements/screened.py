@@ -59,7 +59,8 @@ def screened(
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
     units = measured.units
-    result = screen(x, measured["force"], measured.get("time"), run, whole=whole)
+    time = measured.get("time")
+    result = screen(x, measured["force"], time, run, whole=whole, wanted=wanted)
     if result.asked:
         left = _without_asked(measured, result, skip_bad, whole=whole)
         return screened(left, wanted, whole=whole)
@@ -75,7 +76,7 @@ def screened(
     kept = int(result.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):
         problem = f"{kept} of {run.size} rows are left"
-        problem += f" between {wanted.words(units)}" if wanted is not None else ""
+        problem += f" within {wanted.words(units)}" if wanted is not None else ""
         remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
         raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
