@@ -163,14 +163,16 @@ def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None
 
     The readings determine √(σ² + s² L²) √(1 − ρ²), and hardly the part φ of its square
     that grows: the logarithm of the one and the log odds of the other are the
-    coordinates. Their logistic densities are divided out.
+    coordinates. Their logistic densities are divided out. The middle of the first is
+    that of the prior of σ, where a search for the mode starts.
     """
     size = jnp.sqrt(_mean_square(problem, problem.rows.deformation))
     load = stiffness(problem, values) * size
     logistic = dist.Logistic(0.0, 1.0)
     log_sd = numpyro.sample("_noise_sd", logistic)
     odds = numpyro.sample("_noise_growth", logistic)
-    sd = jnp.exp(log_sd) / added
+    middle = distribution(problem.priors["sigma"], "sigma").icdf(0.5)
+    sd = middle * jnp.exp(log_sd) / added
     steady, grows = log_sigmoid(jnp.negative(odds)), log_sigmoid(odds)
     values["sigma"] = numpyro.deterministic("sigma", sd * jnp.exp(steady / 2.0))
     share = sd * jnp.exp(grows / 2.0) / load

@@ -95,8 +95,9 @@ def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]
 def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     """Return whether readings clearly scatter more the farther the gear is deformed.
 
-    By more than a tenth over the range, with no sd of each row stated and no step of
-    the reading wider than the noise. What a loop leaves at its turns is no noise.
+    By more than a tenth over the range, which noise in proportion to the deformation
+    can do there, with no sd of each row stated and no step of the reading wider than
+    the noise. What a loop leaves at its turns is no noise.
 
     Args:
         case: records and gear.
@@ -105,6 +106,9 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     records, pilot = case.records, pilot or pilot_fit(case.records)
     coarse = case.gear.force_resolution > pilot.noise_sd
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
+        return False
+    far = np.abs(np.asarray(records.deformation))
+    if far.max() < _LEAST_GROWTH * far.min():
         return False
     if "unloading" in records.known:
         pilot = pilot_fit(records, with_loop=True)
