@@ -12,6 +12,7 @@ from structures import form_of
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
+from hdcal.data.reading import read_case
 from hdcal.inference import model
 from hdcal.inference import noise_form as noise_form_module
 from hdcal.inference.checks import correlation_check, growth_check
@@ -255,6 +256,31 @@ def test_what_a_loop_leaves_at_its_turns_does_not_grow(monkeypatch):
         noise_form_module, "pilot_fit", lambda records, **_: plain(records)
     )
     assert grown() > 0.5
+
+
+def test_growth_that_the_range_cannot_show_is_not_asked_for(monkeypatch):
+    """Noise in proportion to a deformation that hardly changes does not grow."""
+    rng = np.random.default_rng(4)
+
+    def grown() -> float:
+        noises = [(X + 0.02) * rng.normal(size=ROWS) for _ in range(50)]
+        return float(np.mean([noise_grows(case_of(e, x=X + 10.0)) for e in noises]))
+
+    assert grown() == 0.0
+    monkeypatch.setattr(noise_form_module, "_LEAST_GROWTH", 1.001)
+    assert grown() > 0.5
+
+
+def test_growing_noise_is_sampled_where_forces_are_large():
+    rng = np.random.default_rng(3)
+    x = np.linspace(4.5, 18.0, 21)
+    force = 40e3 * x - 1.2e6 + 8e3 * rng.normal(size=21)
+    case = read_case({"displacement_mm": x, "force_N": force})
+    found = calibrate(case, effects=(GROWS.name,))
+    assert found.usable
+    line = stats.linregress(x, force)
+    middle = np.median(found.draws["stiffness"])
+    assert middle == pytest.approx(line.slope, abs=line.stderr)
 
 
 @pytest.mark.thorough
