@@ -1,0 +1,46 @@
+"""Coarse readings: whether all forces lie on a grid coarser than their digits."""
+
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.case import Case
+
+# A grid matters from this share of the noise sd on. Rounding to a step scatters by
+# step/√12: much wider than the noise, forces were set and not read.
+_LEAST, _MOST = 0.2, 1.5 * np.sqrt(12.0)
+# Significant digits of a file, digits that a step spans at least, and fits of the grid.
+_DIGITS, _SPANNED, _FITS = 6, 20.0, 6
+
+
+def coarse_step(case: Case, noise_sd: float) -> float:
+    """Return the step of a coarse force reading [N], 0 where it is not coarse.
+
+    The step that the gear file states, or else that of the grid on which all forces
+    lie.
+
+    Args:
+        case: gear and records.
+        noise_sd: of a reading [N].
+    """
+    force = np.asarray(case.records.force, float)
+    step = case.gear.force_resolution or _grid_step(force, noise_sd)
+    return step if _LEAST <= step / noise_sd <= _MOST else 0.0
+
+
+def _grid_step(force: Float[np.ndarray, " n"], noise_sd: float) -> float:
+    """Return the step of the grid on which all forces lie, 0 without one."""
+    values = np.unique(force)
+    gaps = np.diff(values)
+    gaps = gaps[gaps > noise_sd / _SPANNED]
+    if len(gaps) < 2:
+        return 0.0
+    step, zero = float(gaps.min()), 0.0
+    for _ in range(_FITS):
+        counts = np.round((values - values[0]) / step)
+        if counts[-1] < 2.0:
+            return 0.0
+        step, zero = map(float, np.polyfit(counts, values, 1))
+    off = np.abs(values - zero - step * np.round((values - zero) / step))
+    largest = float(np.abs(values).max())
+    digit = max(10.0 ** (np.floor(np.log10(largest)) + 1.0 - _DIGITS), 1e-9)
+    return step if off.max() <= digit and step >= _SPANNED * digit else 0.0
