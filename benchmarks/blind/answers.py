@@ -27,10 +27,13 @@ from benchmarks.blind.sealed_set import (
     refusal,
     write_hashed,
 )
+from hdcal.hypotheses.decision import decide
+from hdcal.hypotheses.table import OUTSIDE
 from hdcal.physics.effect import Effect
 
 Library = Mapping[str, type[Effect]]
 Diagnoser = Callable[[hdcal.Case, Library], Answer]
+COARSE = "quantisation"
 _PACKAGES = ("jax", "jaxlib", "numpy", "numpyro", "scipy")
 OPENED = "opened.json"
 # Read by libraries when a process imports them; a value set by the user stands.
@@ -94,6 +97,52 @@ def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
     )
 
 
+def by_slim(case: hdcal.Case, library: Library) -> Answer:
+    """Answer as the new evidence and its one decision rule do."""
+    found = decide(case, library)
+    # That readings are coarse is a fact, and an explanation where nothing else acts.
+    coarse = found.coarse_step > 0.0 and COARSE in library
+    plain = COARSE if coarse else NONE
+
+    def label(names: tuple[str, ...]) -> str:
+        return "+".join(names).replace(OUTSIDE, UNKNOWN) or plain
+
+    chances = {label(each.names): each.probability for each in found.explanations}
+    members = [label((n,)) for each in found.credible for n in each.names or ("",)]
+    inclusion = {name: found.effects.get(name, 0.0) for name in library}
+    inclusion |= {COARSE: chances.get(COARSE, 0.0)} if coarse else {}
+    best = max(inclusion, key=lambda name: inclusion[name])
+    cause = next((c for c in found.classes if best in c.members), None)
+    group, acts = (cause.members, cause.acts) if cause else ((best,), inclusion[best])
+    verdict = _verdict(chances, group, acts)
+    silent = verdict in (NONE, UNKNOWN)
+    size = cause.closed if cause and not silent else None
+    return Answer(
+        case=case.name,
+        verdict=verdict,
+        effect=None if silent else best,
+        second_effect=None,
+        set=tuple(dict.fromkeys(members)),
+        probabilities={NONE: 0.0, UNKNOWN: 0.0, **chances},
+        inclusion=inclusion,
+        detected=coarse or found.gap > 0.5,
+        closed=(size.median, size.low, size.high) if size else None,
+        group_members=() if silent else group,
+    )
+
+
+def _verdict(chances: dict[str, float], group: tuple[str, ...], acts: float):
+    """Return the verdict of a decision; a class of one is named from 95 % on."""
+    none, outside = chances.get(NONE, 0.0), chances.get(UNKNOWN, 0.0)
+    if none >= 0.5:
+        return NONE
+    if outside >= max(acts, none):
+        return UNKNOWN
+    if acts >= 0.95 and len(group) == 1:
+        return "named"
+    return "group" if acts >= 0.9 else "ambiguous"
+
+
 def _quantiles(interval) -> tuple[float, float, float]:
     return interval.median, interval.lo, interval.hi
 
@@ -137,6 +186,7 @@ def _certain(case: hdcal.Case, library: Library, chances: dict[str, float]) -> A
 
 DIAGNOSERS: dict[str, Diagnoser] = {
     "hdcal": by_hdcal,
+    "slim": by_slim,
     "bic": by_bic,
     "r2": by_r2,
     "none": by_none,

@@ -132,30 +132,6 @@ def components(
     return Components(names, together, tuple(spaces))
 
 
-def orthonormal_shapes(
-    found: Components, problem: LinearProblem
-) -> dict[str, list[Float[np.ndarray, "j n"]]]:
-    """Return the directions that the base model leaves of each shape of each effect.
-
-    Rows are weighted by their stated noise; directions of a shape are orthonormal.
-    """
-    atoms, least = found.atoms, 1e-9 * problem.noise_sd
-    high = np.where(np.isfinite(atoms.amplitude.high), atoms.amplitude.high, 1.0)
-    curves = problem.project(atoms.offset + high[:, None] * atoms.slope)
-    curves = curves * problem.weight
-    size = np.linalg.norm(curves, axis=1)
-    shapes: dict[str, list[np.ndarray]] = {name: [] for name in found.names}
-    for index in np.flatnonzero(size > least):
-        name = found.names[atoms.owner[index]]
-        shapes[name].append(curves[None, index] / size[index])
-    for space in found.spaces:
-        left = problem.project(space.columns) * problem.weight
-        _, strength, axes = np.linalg.svd(left, full_matrices=False)
-        kept = strength > max(1e-6 * strength[0], least)
-        shapes[found.names[space.owner]].append(axes[kept])
-    return shapes
-
-
 def principal(columns: Float[np.ndarray, "k n"], most: int = MOST_COLUMNS):
     """Return at most so many columns with nearly the same covariance, shape (j, n)."""
     if len(columns) <= most:

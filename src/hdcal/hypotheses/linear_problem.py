@@ -72,7 +72,7 @@ class LinearProblem:
     def root(self) -> Float[np.ndarray, "p p"]:
         """The upper triangular R with R'R = X'X + noise_sd² I."""
         held = self.noise_sd * np.eye(self.X.shape[1])
-        return np.linalg.qr(np.vstack([self.X, held]), mode="r")
+        return np.linalg.qr(np.vstack([self.X, held])).R
 
     @cached_property
     def noise_prior(self) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
 from hdcal.hypotheses.coarse_reading import coarse_step
-from hdcal.hypotheses.components import Space, components, orthonormal_shapes
+from hdcal.hypotheses.components import Space, components
 from hdcal.hypotheses.covariates import Predicting, half_cycle_rows, predicting
 from hdcal.hypotheses.evaluation import Evaluated, select
 from hdcal.hypotheses.linear_problem import Expansion, LinearProblem, linear_problem
@@ -56,8 +56,6 @@ class Searched:
         table: evidence of each hypothesis.
         predicting: effects of the library by what the rows tell about them.
         kernels: columns of each kernel of the remainder [N], shape (j, n).
-        shapes: of each effect, what the base model leaves of each of its shapes as
-            orthonormal directions, shape (j, n).
         coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
     """
 
@@ -65,7 +63,6 @@ class Searched:
     table: Table
     predicting: Predicting
     kernels: list[np.ndarray]
-    shapes: dict[str, list[np.ndarray]]
     coarse_step: float
 
 
@@ -97,7 +94,6 @@ def search(case: Case, library: Mapping[str, type[Effect]]) -> Searched:
         table=found.table,
         predicting=found.predicting,
         kernels=[space.columns for space in found.kernels],
-        shapes=found.shapes,
         coarse_step=coarse_step(case, problem.noise_sd),
     )
 
@@ -146,7 +142,6 @@ class _Search:
         )
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
-        self.shapes = orthonormal_shapes(effects, problem)
         self.table = Table((*effects.names, OUTSIDE), equal_noise(problem))
         self.selection = select(
             problem,
