@@ -1,9 +1,12 @@
 """Coarse readings: whether all forces lie on a grid coarser than their digits."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.case import Case
+from hdcal.inference.noise_form import pilot_fit
 
 # A grid matters from this share of the noise sd on. Rounding to a step scatters by
 # step/√12: much wider than the noise, forces were set and not read.
@@ -12,19 +15,30 @@ _LEAST, _MOST = 0.2, 1.5 * np.sqrt(12.0)
 _DIGITS, _SPANNED, _FITS = 6, 20.0, 6
 
 
-def coarse_step(case: Case, noise_sd: float) -> float:
-    """Return the step of a coarse force reading [N], 0 where it is not coarse.
+def with_coarse_step(case: Case) -> Case:
+    """Return the case with the step of its force reading in its gear, if it is coarse.
 
-    The step that the gear file states, or else that of the grid on which all forces
-    lie.
+    That readings are coarse is a fact of the record. As a hypothesis it would compete
+    with those on the mean reading, and explains none of it.
+    """
+    if case.gear.force_resolution > 0.0:
+        return case
+    noise_sd = pilot_fit(case.records).noise_sd
+    step = _grid_step(np.asarray(case.records.force, float), noise_sd)
+    if not _LEAST * noise_sd <= step <= _MOST * noise_sd:
+        return case
+    return replace(case, gear=replace(case.gear, force_resolution=step))
+
+
+def coarse_step(case: Case, noise_sd: float) -> float:
+    """Return the step of the force reading where it matters [N], else 0.
 
     Args:
-        case: gear and records.
+        case: whose gear states the step.
         noise_sd: of a reading [N].
     """
-    force = np.asarray(case.records.force, float)
-    step = case.gear.force_resolution or _grid_step(force, noise_sd)
-    return step if _LEAST <= step / noise_sd <= _MOST else 0.0
+    step = case.gear.force_resolution
+    return step if step >= _LEAST * noise_sd else 0.0
 
 
 def _grid_step(force: Float[np.ndarray, " n"], noise_sd: float) -> float:

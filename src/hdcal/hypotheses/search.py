@@ -12,7 +12,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
-from hdcal.hypotheses.coarse_reading import coarse_step
+from hdcal.hypotheses.coarse_reading import coarse_step, with_coarse_step
 from hdcal.hypotheses.components import Space, components
 from hdcal.hypotheses.covariates import Predicting, half_cycle_rows, predicting
 from hdcal.hypotheses.evaluation import Evaluated, select
@@ -76,7 +76,7 @@ def search(case: Case, library: Mapping[str, type[Effect]]) -> Searched:
     Raises:
         InputError: an effect has no prior.
     """
-    case, _ = average_rows(case, MOST_ROWS)
+    case, _ = average_rows(with_coarse_step(case), MOST_ROWS)
     problem = linear_problem(case, library)
     found = _Search(problem, library)
     found.alone(range(len(problem.correlations)))
@@ -87,14 +87,17 @@ def search(case: Case, library: Mapping[str, type[Effect]]) -> Searched:
         problem = linear_problem(case, library, about)
         found = _Search(problem, library, found.kernels)
         found.alone(range(len(problem.correlations)))
-    found.other_noises(library)
+    step = coarse_step(case, problem.noise_sd)
+    # The noise of a coarse reading is not normal; no effect need explain that.
+    if not step:
+        found.other_noises(library)
     found.pairs()
     return Searched(
         problem=problem,
         table=found.table,
         predicting=found.predicting,
         kernels=[space.columns for space in found.kernels],
-        coarse_step=coarse_step(case, problem.noise_sd),
+        coarse_step=step,
     )
 
 
