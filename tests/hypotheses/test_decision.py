@@ -1,4 +1,4 @@
-"""Planted effects are said to act, lookalikes share a class, and nothing else is said."""
+"""Planted effects are said to act, lookalikes share a class, nothing else is said."""
 
 from dataclasses import replace
 

@@ -15,8 +15,8 @@ from hdcal.hypotheses.search import Searched, search
 from hdcal.hypotheses.table import OUTSIDE, Names
 from hdcal.physics.effect import Effect
 
-# By which log posterior odds are divided. At this value the explanations have the largest
-# mean log score over two learning sets of the blind check, 160 cases each.
+# By which log posterior odds are divided. At this value the mean log score of the
+# explanations of two learning sets of the blind check, 160 cases each, is largest.
 TEMPERATURE = 1.3
 # Probability of the credible set, and of an interval.
 _CREDIBLE = 0.9
