@@ -15,7 +15,7 @@ from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
 from hdcal.hypotheses.coarse_reading import coarse_step, with_coarse_step
 from hdcal.hypotheses.components import Space, components
 from hdcal.hypotheses.covariates import Predicting, half_cycle_rows, predicting
-from hdcal.hypotheses.evaluation import Evaluated, select
+from hdcal.hypotheses.evaluation import Evaluated
 from hdcal.hypotheses.linear_problem import Expansion, LinearProblem, linear_problem
 from hdcal.hypotheses.local_structure import likeliest_members, local_families
 from hdcal.hypotheses.noise_models import (
@@ -28,6 +28,7 @@ from hdcal.hypotheses.noise_models import (
 )
 from hdcal.hypotheses.parts import Part, join, log_sign_probability, posterior
 from hdcal.hypotheses.remainder import kernels
+from hdcal.hypotheses.selection import select
 from hdcal.hypotheses.table import OUTSIDE, Names, Table
 from hdcal.physics.effect import Effect
 
