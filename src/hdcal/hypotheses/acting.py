@@ -110,11 +110,14 @@ def _drawn(
     square = np.sum(curves**2, axis=2)
     shown = square > _SHOWN * problem.noise_sd**2
     shown &= square > least**2 * curves.shape[2]
+    gaps = np.einsum("kd,kdn->dn", shown, curves)
+    # What points away from the gap only makes up for another component.
+    shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)
         acts = [k for k, on in enumerate(pattern) if on]
         curve = {names[k]: curves[k, these] for k in acts}
-        gap = np.sum(curves[acts][:, these], axis=0)
+        gap = gaps[these]
         classes: dict[str, list[np.ndarray]] = defaultdict(list)
         for name, values in curve.items():
             classes[class_of.get(name, name)].append(values)
