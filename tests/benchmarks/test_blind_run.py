@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.blind import __main__ as program
-from benchmarks.blind.answers import answer_set, by_bic, by_none, by_r2
+from benchmarks.blind.answers import answer_set, by_bic, by_none, by_r2, by_slim
 from benchmarks.blind.rivals import closable_share, fit_each
 from commands import XB1
 from diagnosis_cases import NOISE, rich, simulated
@@ -112,4 +112,14 @@ def test_rivals_on_noise_alone():
     bic, r2, none = (by(case, EFFECTS) for by in (by_bic, by_r2, by_none))
     assert bic.verdict == none.verdict == "none" and r2.verdict == "named"
     for each in (bic, r2, none):
+        assert np.isclose(sum(each.probabilities.values()), 1.0)
+
+
+def test_new_evidence_answers():
+    size = {"hysteresis": {"force": 4.0, "reach": 0.1}}
+    plain, loop = (by_slim(simulated(rich(), e, seed=1), EFFECTS) for e in ({}, size))
+    assert plain.verdict == "none" and not plain.detected and plain.set == ("none",)
+    assert loop.effect == "hysteresis" and loop.inclusion["hysteresis"] > 0.9
+    assert loop.set == ("hysteresis",) and loop.closed is not None
+    for each in (plain, loop):
         assert np.isclose(sum(each.probabilities.values()), 1.0)
