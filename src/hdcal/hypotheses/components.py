@@ -118,7 +118,11 @@ def components(
 ) -> Components:
     """Return atoms and spaces of the effects on the mean reading."""
     names = tuple(n for n, effect in effects.items() if effect.stage != "noise")
-    atoms, spaces = [], []
+    none = np.zeros(0)
+    nothing = Amplitudes(none, none, none, none, none)
+    rows = np.zeros((0, len(problem.y)))
+    atoms = [Atoms(none.astype(int), rows, rows, nothing, none)]
+    spaces: list[Space] = []
     for owner, effect in enumerate(effects[name] for name in names):
         if issubclass(effect, Scatter):
             spaces.append(_members(owner, effect, problem))

@@ -37,8 +37,8 @@ class _Stack(NamedTuple):
 
 def _stack(spaces: Sequence[Space], width: int = 1, points: int = 1) -> _Stack:
     """Return spaces of at least this many columns and points of the grid."""
-    width = max(width, *(len(space.columns) for space in spaces))
-    points = max(points, *(len(space.scale) for space in spaces))
+    width = max([width, *(len(space.columns) for space in spaces)])
+    points = max([points, *(len(space.scale) for space in spaces)])
 
     def padded(values, size: int, filler: float = 0.0):
         rest = [(0, size - len(values)), *[(0, 0)] * (values.ndim - 1)]
@@ -83,7 +83,9 @@ class Selection:
     _white: dict[tuple, _Whitened] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._stack = _stack(self.spaces)
+        nothing = np.zeros((1, len(self.problem.y)))
+        none = Space(0, nothing, np.ones(1), np.full(1, -np.inf))
+        self._stack = _stack(self.spaces or (none,))
 
     def evaluate(
         self, noise: NoiseModel, context: Context, extra: Sequence[Space] = ()
@@ -143,7 +145,7 @@ class Selection:
         )
         lam, te2 = variance * axes.square[:, None], variance * (te**2)[:, None]
         found = log_marginal(
-            len(error[0]),
+            self.problem.count,
             Products(ee, lam, te2, slope),
             self.atoms.amplitude,
             self.problem.noise_prior,
@@ -168,7 +170,8 @@ def _spaces(projection: Projection, columns, gram, stack: _Stack) -> Items:
         variance * axes.square[:, None],
         variance * te[:, None] ** 2,
     )
-    found = log_marginal(count, products, None, projection.problem.noise_prior)
+    problem = projection.problem
+    found = log_marginal(problem.count, products, None, problem.noise_prior)
     log_evidence = found.log_evidence + stack.log_weight + projection.constant
     return found._replace(log_evidence=log_evidence)
 

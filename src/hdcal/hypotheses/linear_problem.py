@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.linalg import cho_solve
 
 from hdcal.data.case import Case
@@ -99,6 +99,20 @@ class LinearProblem:
         first = np.moveaxis(scaled, -1, 0)
         white = serial_correlation.whiten(first, self.before, correlation)
         return np.ascontiguousarray(np.moveaxis(white, 0, -1))
+
+    @property
+    def count(self) -> int:
+        """Number of rows that count: those that are not left out."""
+        return int(np.count_nonzero(self.weight))
+
+    def without(self, left_out: Bool[np.ndarray, " n"]) -> "LinearProblem":
+        """Return the problem in which some rows tell nothing."""
+        gone = left_out | (left_out[self.before] & (self.before >= 0))
+        return replace(
+            self,
+            weight=np.where(left_out, 0.0, self.weight),
+            before=np.where(gone, -1, self.before),
+        )
 
     def with_columns(
         self, offset: Float[np.ndarray, " n"], columns: Float[np.ndarray, "c n"]

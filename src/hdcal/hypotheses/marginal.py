@@ -117,6 +117,8 @@ def log_marginal(
         prior: of their amplitudes, each of shape (m,); None without a slope.
         sigma: frozen distribution of the noise sd [N].
     """
+    if not products.ee.size:
+        return Items(*4 * [products.ee])
     if prior is not None:
         prior = Amplitudes(*(column[:, None] for column in prior))
     variance = _likeliest_variance(count, products, prior)

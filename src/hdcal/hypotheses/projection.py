@@ -37,7 +37,8 @@ class Projection:
         self.square = float(self.y @ self.y - along @ along)
         volume = log_volume(np.sum(problem.before >= 0), noise.correlation)
         log_det = np.sum(np.log(np.abs(np.diag(r)))) - np.sum(np.log(held))
-        constant = np.sum(np.log(noise.weight)) - float(volume) - log_det
+        counting = noise.weight[noise.weight > 0.0]
+        constant = np.sum(np.log(counting)) - float(volume) - log_det
         self.constant = float(constant) + noise.log_prior
 
     def whiten(self, curves):
@@ -65,7 +66,7 @@ class Projection:
         """Return the log evidence of base and context alone."""
         none = np.zeros((1, 1, 0))
         products = Products(np.full((1, 1), self.square), none, none)
-        found = log_marginal(len(self.y), products, None, self.problem.noise_prior)
+        found = log_marginal(self.problem.count, products, None, self.problem.noise_prior)
         return float(found.log_evidence[0, 0]) + self.constant
 
 

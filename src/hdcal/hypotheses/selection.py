@@ -33,6 +33,9 @@ def select(
         names: of all components, the remainder last.
     """
     atoms, nothing = effects.atoms, np.zeros((len(problem.y),))
+    if not len(atoms.owner):
+        tolerance = np.zeros((0, *problem.tolerance.shape))
+        return Selection(problem, atoms, tolerance, (*effects.spaces, *kernels), names)
     tables, sizes = [], []
     for noise in noises:
         none = Context(nothing, np.zeros((0, len(problem.y))))
@@ -65,6 +68,6 @@ def _alone(projection: Projection, atoms: Atoms) -> Items:
     ee, eu, uu = projection.products(error, projection.whiten(atoms.slope))
     none = np.zeros((len(error), 1, 0))
     products = Products(ee, none, none, SlopeProducts(eu, uu, none, none))
-    found = log_marginal(len(error[0]), products, atoms.amplitude, problem.noise_prior)
+    found = log_marginal(problem.count, products, atoms.amplitude, problem.noise_prior)
     weight = atoms.log_weight[:, None] + projection.constant
     return found._replace(log_evidence=found.log_evidence + weight)

@@ -1,0 +1,1 @@
+"""Diagnosis: where model and readings part, which effect causes it, and how far."""

@@ -1,0 +1,110 @@
+"""The gap between the base model and the readings, row by row."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.records import Records
+from hdcal.hypotheses.noise_models import NoiseModel
+from hdcal.hypotheses.parts import Part, posterior, sampled_curves
+from hdcal.hypotheses.search import Searched
+from hdcal.hypotheses.table import OUTSIDE, Names
+
+_DRAWS = 600
+
+
+@dataclass(frozen=True)
+class GapByRow:
+    """What the base model leaves of the readings.
+
+    Attributes:
+        records: the rows that were looked at, run after run: all, means of neighbours,
+            or one of several.
+        residual: reading less the base model fitted alone [N], shape (n,).
+        draws: of the gap, over all hypotheses [N], shape (d, n).
+    """
+
+    records: Records
+    residual: Float[np.ndarray, " n"]
+    draws: Float[np.ndarray, "d n"]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The likeliest hypothesis with some effects, fitted to all rows.
+
+    Attributes:
+        noise: its model of the noise.
+        noise_sd: of a typical row [N].
+        rms: what is left beside the base model, then with each effect besides, then
+            with what is outside the library [N], by what was added last.
+    """
+
+    noise: NoiseModel
+    noise_sd: float
+    rms: Mapping[str, float]
+
+
+def gap_by_row(
+    searched: Searched,
+    posterior_of: Mapping[Names, np.ndarray],
+    rng: np.random.Generator,
+) -> GapByRow:
+    """Return residuals and posterior draws of the gap.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior_of: probability of each, by model of the noise.
+        rng: source of randomness.
+    """
+    problem, table = searched.problem, searched.table
+    keys = [*posterior_of]
+    chance = np.array([posterior_of[key].sum() for key in keys])
+    draws = [np.zeros((0, len(problem.y)))]
+    for key, count in zip(keys, rng.multinomial(_DRAWS, chance), strict=True):
+        noise, parts = table.likeliest_noise(key), table.parts[key]
+        if count and not parts:
+            draws.append(np.zeros((count, len(problem.y))))
+        elif count:
+            curves = sampled_curves(problem, noise, parts, int(count), rng)
+            draws.append(curves.sum(axis=0) / noise.weight)
+    plain = table.likeliest_noise(())
+    residual = problem.y - posterior(problem, plain, []).reading
+    return GapByRow(problem.records, residual, np.concatenate(draws))
+
+
+def fitted(
+    searched: Searched,
+    posterior_of: Mapping[Names, np.ndarray],
+    names: Sequence[str],
+) -> Fitted:
+    """Return the likeliest hypothesis that holds some effects.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior_of: probability of each, by model of the noise.
+        names: of the effects on the mean reading; some of a hypothesis.
+    """
+    problem, table = searched.problem, searched.table
+    holding = [key for key in posterior_of if {*names} <= {*key}]
+    key = max(holding, key=lambda each: posterior_of[each].sum())
+    noise, parts = table.likeliest_noise(key), table.parts[key]
+    by_name = {table.names[part.component]: part for part in parts}
+    rms, added = {"": _rms(searched, noise, [])}, []
+    for name in (*names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
+        if name in by_name:
+            added.append(by_name[name])
+            rms[name] = _rms(searched, noise, added)
+    found = posterior(problem, noise, parts)
+    left = (problem.y - found.reading) * noise.weight
+    used = len(found.mean) - float(np.sum(found.factor**2))
+    free = max(problem.count - used, 1.0)
+    return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
+
+
+def _rms(searched: Searched, noise: NoiseModel, parts: Sequence[Part]) -> float:
+    problem = searched.problem
+    left = problem.y - posterior(problem, noise, parts).reading
+    return float(np.sqrt(np.mean(left**2)))
