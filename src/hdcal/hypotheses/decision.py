@@ -19,14 +19,14 @@ from hdcal.physics.effect import Effect
 # explanations of two learning sets of the blind check, 160 cases each, is largest.
 TEMPERATURE = 1.3
 # Probability of the credible set, and of an interval.
-_CREDIBLE = 0.9
+_CREDIBLE, _INTERVAL = 0.9, 0.95
 # Probability from which on an effect is said to act, and least p-value of a fit.
 _LIKELY, _ADEQUATE = 0.5, 0.01
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A median with the ends of a 90 % interval."""
+    """A median with the ends of a 95 % interval."""
 
     median: float
     low: float
@@ -191,7 +191,7 @@ def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
     order = np.argsort(values)
     weights = weights[order] / weights.sum()
     place = np.cumsum(weights) - 0.5 * weights
-    tail = 0.5 * (1.0 - _CREDIBLE)
+    tail = 0.5 * (1.0 - _INTERVAL)
     low, median, high = np.interp((tail, 0.5, 1.0 - tail), place, values[order])
     return Interval(float(median), float(low), float(high))
 

@@ -1,0 +1,174 @@
+"""Diagnose a case: where model and readings part, which effect causes it, how far."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from hdcal.data.case import Case, require_case
+from hdcal.data.theory_names import SPRING
+from hdcal.diagnosis.library import library_of
+from hdcal.explanation.closing import closed_on_left_out
+from hdcal.explanation.gap import Fitted, fitted, gap_by_row
+from hdcal.explanation.result import (
+    ADEQUATE,
+    LIKELY,
+    NAMED,
+    Cause,
+    Data,
+    Diagnosis,
+    Explanation,
+    Gap,
+    HowFar,
+    Rung,
+    VerdictWord,
+    Which,
+)
+from hdcal.explanation.seen import what_is_seen
+from hdcal.hypotheses.decision import (
+    TEMPERATURE,
+    CauseClass,
+    Decision,
+    decide_searched,
+)
+from hdcal.hypotheses.decision import Interval as Found
+from hdcal.hypotheses.search import Searched, search
+from hdcal.hypotheses.table import OUTSIDE
+from hdcal.physics.effect import Effect
+from hdcal.physics.theory import THEORIES
+from hdcal.report.item import Interval
+from hdcal.report.words import label
+from hdcal.versions import versions
+
+
+# Thousands of small systems are solved, over which threads only wait for each other.
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def diagnose(
+    case: Case, *, library: Mapping[str, type[Effect]] | None = None, seed: int = 0
+) -> Diagnosis:
+    """Say where model and readings part, which effect causes it and how far it closes.
+
+    Args:
+        case: from `read_case`.
+        library: effects to consider, by name; by default all of them.
+        seed: of all random numbers.
+
+    Raises:
+        InputError: the library is none, or an effect has no prior.
+    """
+    require_case(case)
+    effects = library_of(library)
+    rng = np.random.default_rng(seed)
+    searched = search(case, effects)
+    found = decide_searched(searched, seed=seed)
+    posterior = searched.table.posterior(TEMPERATURE)
+    names = [each.members[0] for each in found.acting if each.closed is not None]
+    fit = fitted(searched, posterior, names)
+    largest = float(np.max(np.abs(case.records.force)))
+    size = _interval(found.gap_N)
+    return Diagnosis(
+        part="part" if case.gear.theory == SPRING else "gear",
+        units=case.units,
+        gap=Gap(
+            probability=found.gap,
+            rms_N=size,
+            noise_sd_N=fit.noise_sd,
+            share_of_full_scale=size.median / largest if size else None,
+            correlation=fit.noise.correlation,
+        ),
+        seen=what_is_seen(searched.problem, case),
+        which=_which(found),
+        how_far=_how_far(case, searched, fit, names, rng),
+        coarse_step_N=found.coarse_step,
+        library=tuple(effects),
+        seed=seed,
+        versions=versions(),
+        data=Data(
+            name=case.name,
+            rows=len(case.records.force),
+            rows_diagnosed=len(searched.problem.y),
+            sha256=case.data_sha256,
+            notes=case.notes,
+        ),
+        case=case,
+        rows=gap_by_row(searched, posterior, rng),
+    )
+
+
+def _interval(found: Found | None) -> Interval | None:
+    return found and Interval(median=found.median, lo=found.low, hi=found.high)
+
+
+def _which(found: Decision) -> Which:
+    def cause(each: CauseClass) -> Cause:
+        members = tuple(name for name in each.members if name != OUTSIDE)
+        closed = _interval(each.closed)
+        return Cause(members=members, probability=each.acts, explains=closed)
+
+    return Which(
+        verdict=_verdict(found),
+        causes=tuple(map(cause, found.classes)),
+        outside=cause(found.outside),
+        set=tuple(
+            Explanation(
+                effects=tuple(name for name in each.names if name != OUTSIDE),
+                outside=OUTSIDE in each.names,
+                probability=each.probability,
+            )
+            for each in found.credible
+        ),
+        effects=dict(found.effects),
+        fits=found.p_adequate >= ADEQUATE,
+        p_value=found.p_adequate,
+        not_testable={n: tuple(columns) for n, columns in found.lacking.items()},
+    )
+
+
+def _verdict(found: Decision) -> VerdictWord:
+    """Return the answer in a word."""
+    if found.gap <= LIKELY:
+        return "none"
+    leading = found.classes[0] if found.classes else found.outside
+    if not found.acting and found.outside.acts > LIKELY:
+        return "unknown"
+    if leading.acts < NAMED:
+        return "ambiguous"
+    return "named" if len(leading.members) == 1 else "group"
+
+
+def _how_far(
+    case: Case,
+    searched: Searched,
+    fit: Fitted,
+    names: Sequence[str],
+    rng: np.random.Generator,
+) -> HowFar:
+    closed, word = None, ""
+    if names:
+        closed, word = closed_on_left_out(searched, fit.noise, fit.noise_sd, names, rng)
+    ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
+    ladder += [
+        Rung(model=_model(name), rms_N=size)
+        for name, size in fit.rms.items()
+        if name != OUTSIDE or len(fit.rms) > 1
+    ]
+    ladder.append(Rung(model="noise", rms_N=fit.noise_sd))
+    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
+
+
+def _model(added: str) -> str:
+    if not added:
+        return "calibrated straight model"
+    return "and outside the library" if added == OUTSIDE else f"and {label(added)}"
+
+
+def _formula(case: Case, searched: Searched) -> Rung:
+    """Return what the formula itself leaves: K = 1, no offset."""
+    records, reading = searched.problem.records, searched.problem.reading
+    modulus = case.gear.priors["E0"].numbers[0]
+    stiffness = float(THEORIES[case.gear.theory](case.gear.geometry, modulus))
+    rise = np.asarray(records.temperature) - reading.reference_temperature
+    soft = 1.0 - float(searched.problem.base.alpha) * rise
+    radial = np.asarray(records.deformation) * reading.radial_per_read
+    left = np.asarray(records.force) - stiffness * soft * radial
+    return Rung(model="formula with K = 1", rms_N=float(np.sqrt(np.mean(left**2))))
