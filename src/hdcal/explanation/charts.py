@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Bins of the deformation in which the band of the gap is drawn, classes that are shown,
 # and the least probability of one.
-_BINS, _MOST, _LEAST = 40, 8, 0.01
+_BINS, _MOST, _LEAST = 12, 8, 0.01
 _COLOURS = {1: BLUE, -1: ORANGE}
 
 
@@ -57,6 +57,7 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
         title=f"{case.name}: what the straight model leaves",
         wide=True,
         height=4.0,
+        legend_beside=True,
     )
     return Chart(panels=[panel])
 

@@ -5,11 +5,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
+from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.library import library_of
 from hdcal.explanation.closing import closed_on_left_out
 from hdcal.explanation.gap import Fitted, fitted, gap_by_row
+from hdcal.explanation.next_run import rank_runs
+from hdcal.explanation.refit import Refits, failure_reasons, refit
 from hdcal.explanation.result import (
     ADEQUATE,
     LIKELY,
@@ -20,6 +24,7 @@ from hdcal.explanation.result import (
     Explanation,
     Gap,
     HowFar,
+    Refit,
     Rung,
     VerdictWord,
     Which,
@@ -34,8 +39,11 @@ from hdcal.hypotheses.decision import (
 from hdcal.hypotheses.decision import Interval as Found
 from hdcal.hypotheses.search import Searched, search
 from hdcal.hypotheses.table import OUTSIDE
+from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
+from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.engine.pooled import pool
 from hdcal.report.item import Interval
 from hdcal.report.words import label
 from hdcal.versions import versions
@@ -44,26 +52,37 @@ from hdcal.versions import versions
 # Thousands of small systems are solved, over which threads only wait for each other.
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
-    case: Case, *, library: Mapping[str, type[Effect]] | None = None, seed: int = 0
+    case: Case,
+    *,
+    library: Mapping[str, type[Effect]] | None = None,
+    quick: bool = False,
+    seed: int = 0,
+    progress: Progress | None = None,
 ) -> Diagnosis:
     """Say where model and readings part, which effect causes it and how far it closes.
 
     Args:
         case: from `read_case`.
         library: effects to consider, by name; by default all of them.
+        quick: without calibrating the models that are left.
         seed: of all random numbers.
+        progress: called with (iterations done, iterations in all) while sampling.
 
     Raises:
-        InputError: the library is none, or an effect has no prior.
+        InputError: the library is none, an effect has no prior, or the case cannot be
+            diagnosed.
     """
     require_case(case)
     effects = library_of(library)
+    check_effect_priors(case, {**EFFECTS, **effects})
+    require_scatter(case)
     rng = np.random.default_rng(seed)
     searched = search(case, effects)
     found = decide_searched(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
     names = [each.members[0] for each in found.acting if each.closed is not None]
     fit = fitted(searched, posterior, names)
+    fits = refit(case, found.hypotheses, effects, seed, progress, quick=quick)
     largest = float(np.max(np.abs(case.records.force)))
     size = _interval(found.gap_N)
     return Diagnosis(
@@ -79,6 +98,14 @@ def diagnose(
         seen=what_is_seen(searched.problem, case),
         which=_which(found),
         how_far=_how_far(case, searched, fit, names, rng),
+        next_test=tuple(
+            run.model_copy(update={"run": case.units.say(run.run)})
+            for run in rank_runs(searched, posterior, rng)
+        ),
+        refits=_ranked(fits),
+        left_out=fits.left_out,
+        stiffness_N_per_mm=_stiffness(fits),
+        reasons=failure_reasons(fits),
         coarse_step_N=found.coarse_step,
         library=tuple(effects),
         seed=seed,
@@ -92,7 +119,20 @@ def diagnose(
         ),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
+        models=dict(fits.models),
     )
+
+
+def _ranked(fits: Refits) -> tuple[Refit, ...]:
+    ranked = sorted(fits.models.items(), key=lambda item: -item[1][0])
+    return tuple(Refit(hypothesis=n, probability=share) for n, (share, _) in ranked)
+
+
+def _stiffness(fits: Refits) -> Interval | None:
+    """Return the stiffness as read over all models [N/mm]."""
+    if not fits.models:
+        return None
+    return Interval.of(pool([*fits.models.values()]).values["stiffness"])
 
 
 def _interval(found: Found | None) -> Interval | None:

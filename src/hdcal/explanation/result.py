@@ -8,7 +8,10 @@ from pydantic import Field, InstanceOf
 from hdcal.data.case import Case
 from hdcal.explanation.charts import gap_chart, ladder_chart, which_chart
 from hdcal.explanation.gap import GapByRow
+from hdcal.explanation.next_run import NextRun
 from hdcal.explanation.seen import Seen
+from hdcal.inference.model_average import LeftOut, ModelAverage
+from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,
@@ -134,6 +137,13 @@ class HowFar(Item):
     left_out: str
 
 
+class Refit(Item):
+    """A hypothesis that was calibrated: a group of posterior.nc."""
+
+    hypothesis: Words
+    probability: Probability
+
+
 class Data(Item):
     """Which data they were.
 
@@ -160,6 +170,10 @@ class Diagnosis(Result):
         seen: what readings show whatever its cause, the clearest first.
         which: effects that cause it.
         how_far: it closes once they are added.
+        next_test: runs that would tell more, best first.
+        refits: calibrated models, the most probable first; none of a quick diagnosis.
+        left_out: hypotheses without a calibration of their own.
+        stiffness_N_per_mm: as read, over the calibrated models.
         coarse_step_N: step of forces that are read coarsely; 0 where they are not.
         library: names of the effects that were considered.
         seed: of the random numbers.
@@ -167,6 +181,7 @@ class Diagnosis(Result):
         data: that were diagnosed.
         case: likewise.
         rows: gap and residual of each.
+        models: the calibrated models with their probabilities.
     """
 
     template = "explanation/report.md.j2"
@@ -178,6 +193,10 @@ class Diagnosis(Result):
     seen: tuple[Seen, ...]
     which: Which
     how_far: HowFar
+    next_test: tuple[NextRun, ...]
+    refits: tuple[Refit, ...]
+    left_out: LeftOut | None
+    stiffness_N_per_mm: Interval | None = quantity("stiffness as read", "N/mm")
     coarse_step_N: float
     library: tuple[EffectName, ...]
     seed: Count
@@ -185,11 +204,17 @@ class Diagnosis(Result):
     data: Data
     case: InstanceOf[Case] = Field(exclude=True)
     rows: InstanceOf[GapByRow] = Field(exclude=True)
+    models: dict[str, tuple[float, InstanceOf[Posterior]]] = Field(exclude=True)
 
     @property
     def effects(self) -> tuple[Cause, ...]:
         """The classes of effects, and what is outside the library."""
         return (*self.which.causes, self.which.outside)
+
+    @property
+    def average(self) -> ModelAverage | None:
+        """The calibrated models, for predictions; None of a quick diagnosis."""
+        return ModelAverage(self.models, self.left_out) if self.models else None
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return where the gap lies, which effects cause it and how far it closes."""

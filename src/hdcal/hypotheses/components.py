@@ -61,6 +61,7 @@ class Atoms(NamedTuple):
 
     Attributes:
         owner: index of the effect, shape (m,).
+        shape: index of the point of its shape parameters, shape (m,).
         offset: contribution at amplitude 0 [N], shape (m, n).
         slope: contribution per unit of the amplitude [N], shape (m, n).
         amplitude: priors of the amplitudes.
@@ -68,6 +69,7 @@ class Atoms(NamedTuple):
     """
 
     owner: Int[np.ndarray, " m"]
+    shape: Int[np.ndarray, " m"]
     offset: Float[np.ndarray, "m n"]
     slope: Float[np.ndarray, "m n"]
     amplitude: Amplitudes
@@ -90,12 +92,15 @@ class Space(NamedTuple):
         columns: contribution per unit of each coefficient [N], shape (j, n).
         scale: values of the prior sd, shape (t,).
         log_weight: log prior probability of each, shape (t,).
+        shape: index of the point of the shape parameters of an effect with several
+            amplitudes; −1 of the others.
     """
 
     owner: int
     columns: Float[np.ndarray, "j n"]
     scale: Float[np.ndarray, " t"]
     log_weight: Float[np.ndarray, " t"]
+    shape: int = -1
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,8 @@ def components(
     none = np.zeros(0)
     nothing = Amplitudes(none, none, none, none, none)
     rows = np.zeros((0, len(problem.y)))
-    atoms = [Atoms(none.astype(int), rows, rows, nothing, none)]
+    index = none.astype(int)
+    atoms = [Atoms(index, index, rows, rows, nothing, none)]
     spaces: list[Space] = []
     for owner, effect in enumerate(effects[name] for name in names):
         if issubclass(effect, Scatter):
@@ -180,6 +186,7 @@ def _linear_atoms(
     sides, same = 2.0 if grid.one_sided else 1.0, np.ones(len(sds))
     return Atoms(
         owner=np.full(len(sds), owner),
+        shape=np.repeat(np.arange(grid.size), len(scales)),
         offset=np.zeros_like(slope),
         slope=slope,
         amplitude=Amplitudes(
@@ -202,6 +209,7 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
     none = np.zeros(len(log_height))
     return Atoms(
         owner=np.full(len(none), owner),
+        shape=np.repeat(np.arange(grid.size), len(width)),
         offset=offset.reshape(len(none), -1),
         slope=slope.reshape(len(none), -1),
         amplitude=Amplitudes(
@@ -230,11 +238,15 @@ def _several_amplitudes(
 ) -> list[Space]:
     """Return a space for each shape point of an effect with several amplitudes."""
     grid = make_grid(effect, problem.priors, kind="subspace")
-    table = _curves(effect, problem, grid.one_amplitude_each(grid.shapes))
-    table = table.reshape(grid.size, len(grid.amplitudes), -1)
-    table = table[_shown(grid, problem)]
+    shown = np.flatnonzero(_shown(grid, problem))
+    shapes = {name: values[shown] for name, values in grid.shapes.items()}
+    table = _curves(effect, problem, grid.one_amplitude_each(shapes))
+    table = table.reshape(len(shown), len(grid.amplitudes), -1)
     weights = np.log(SCALE_WEIGHTS) - np.log(len(table))
-    return [Space(owner, columns, SCALES, weights) for columns in table]
+    return [
+        Space(owner, columns, SCALES, weights, int(shape))
+        for shape, columns in zip(shown, table, strict=True)
+    ]
 
 
 def _shown(grid: ParameterGrid, problem: LinearProblem) -> Bool[np.ndarray, " s"]:
@@ -262,3 +274,40 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     below = erf(edges[:, None] / (np.sqrt(2.0) * SCALES)) @ SCALE_WEIGHTS
     log_mass = np.log(np.maximum(np.diff(below), 1e-300))
     return Space(owner, principal(columns), sd * STEPS, log_mass)
+
+
+def atom_on_rows(
+    effect: type[Effect], problem: LinearProblem, atom: Atoms
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return offset and slope of one atom on other rows than it was made of [N].
+
+    Args:
+        effect: of the atom.
+        problem: with the other rows as its records.
+        atom: picked by a single index.
+    """
+    shape, amplitude = int(atom.shape), atom.amplitude
+    linear = float(amplitude.precision) > 0.0
+    grid = make_grid(effect, problem.priors, FINE, "linear" if linear else "cells")
+    unit = grid.mean + 2.0 * grid.sd
+    ends = [0.0, unit] if linear else [float(amplitude.low), float(amplitude.high)]
+    values = {name: np.full(2, each[shape]) for name, each in grid.shapes.items()}
+    values[grid.amplitudes[0]] = np.array(ends)
+    first, second = _curves(effect, problem, values)
+    slope = (second - first) / (ends[1] - ends[0])
+    return first - slope * ends[0], slope
+
+
+def space_on_rows(
+    effect: type[Effect], problem: LinearProblem, shape: int
+) -> Float[np.ndarray, "j n"]:
+    """Return the columns of an effect with several amplitudes on other rows [N].
+
+    Args:
+        effect: with several amplitudes.
+        problem: with the other rows as its records.
+        shape: index of the point of its shape parameters.
+    """
+    grid = make_grid(effect, problem.priors, kind="subspace")
+    shapes = {name: values[[shape]] for name, values in grid.shapes.items()}
+    return _curves(effect, problem, grid.one_amplitude_each(shapes))

@@ -160,7 +160,7 @@ def linear_problem(
     noise_sd = float(about.noise_sd or max(pilot_fit(records).noise_sd, least))
     log_mean, log_sd = _log_stiffness(case, priors)
     base = _base(records, reading, priors, noise_sd, about.stiffness, np.exp(log_mean))
-    columns = _base_columns(records, reading, priors, base, log_sd)
+    columns = base_columns(records, reading, priors, base, log_sd)
     log_shift = log_mean - float(np.log(float(base.stiffness)))
     mean = base.force_offset + columns[:, 0] / log_sd * (1.0 + log_shift)
     return LinearProblem(
@@ -235,7 +235,7 @@ def _base(
     return Base(stiffness, alpha, zero, offset, noise_sd)
 
 
-def _base_columns(
+def base_columns(
     records: Records,
     reading: Reading,
     priors: Mapping[str, Prior],

@@ -66,7 +66,9 @@ class Projection:
         """Return the log evidence of base and context alone."""
         none = np.zeros((1, 1, 0))
         products = Products(np.full((1, 1), self.square), none, none)
-        found = log_marginal(self.problem.count, products, None, self.problem.noise_prior)
+        found = log_marginal(
+            self.problem.count, products, None, self.problem.noise_prior
+        )
         return float(found.log_evidence[0, 0]) + self.constant
 
 

@@ -15,7 +15,7 @@ from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
 from hdcal.hypotheses.coarse_reading import coarse_step, with_coarse_step
 from hdcal.hypotheses.components import Space, components
 from hdcal.hypotheses.covariates import Predicting, half_cycle_rows, predicting
-from hdcal.hypotheses.evaluation import Evaluated
+from hdcal.hypotheses.evaluation import Evaluated, Selection
 from hdcal.hypotheses.linear_problem import Expansion, LinearProblem, linear_problem
 from hdcal.hypotheses.local_structure import likeliest_members, local_families
 from hdcal.hypotheses.noise_models import (
@@ -56,6 +56,7 @@ class Searched:
         problem: the linear problem.
         table: evidence of each hypothesis.
         predicting: effects of the library by what the rows tell about them.
+        selection: the components that were compared.
         kernels: columns of each kernel of the remainder [N], shape (j, n).
         coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
     """
@@ -63,6 +64,7 @@ class Searched:
     problem: LinearProblem
     table: Table
     predicting: Predicting
+    selection: Selection
     kernels: list[np.ndarray]
     coarse_step: float
 
@@ -97,6 +99,7 @@ def search(case: Case, library: Mapping[str, type[Effect]]) -> Searched:
         problem=problem,
         table=found.table,
         predicting=found.predicting,
+        selection=found.selection,
         kernels=[space.columns for space in found.kernels],
         coarse_step=step,
     )

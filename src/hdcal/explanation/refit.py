@@ -1,0 +1,183 @@
+"""The hypotheses that are left by NUTS, each with the probability that it carries.
+
+Every hypothesis of 5 % and more is calibrated, whatever the verdict. What is left out
+is not shared out among them: where it is more than 2 %, a model with a leftover
+discrepancy is calibrated too and carries it, as it bends wherever the data let it: the
+plain one, or that of the likeliest effect where most of what is left out is this effect
+and something more. Below that the widest model does, the one that knows the stiffness
+least.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.calibration.calibrate import calibrate
+from hdcal.data.case import Case
+from hdcal.hypotheses.table import OUTSIDE, Names
+from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.sample import Progress
+from hdcal.physics.effect import Effect
+
+# Least probability of a hypothesis that is calibrated; more than the second is not left
+# to a model of something else.
+LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
+
+
+@dataclass(frozen=True)
+class Refits:
+    """Calibrated hypotheses.
+
+    Attributes:
+        models: probability and posterior by hypothesis, of those that may be used;
+            `none` for the plain model, `unknown` for that with a leftover gap. The
+            probabilities sum to 1.
+        left_out: what has no model among these; None without any.
+        failed: calibrations that failed their checks.
+    """
+
+    models: Mapping[str, tuple[float, Posterior]]
+    left_out: LeftOut | None
+    failed: Mapping[str, Posterior]
+
+    @property
+    def likeliest(self) -> str | None:
+        """Name of the most probable one."""
+        return max(self.models, key=lambda name: self.models[name][0], default=None)
+
+
+def refit(
+    case: Case,
+    hypotheses: Mapping[Names, float],
+    library: dict[str, type[Effect]],
+    seed: int,
+    progress: Progress | None,
+    *,
+    quick: bool = False,
+) -> Refits:
+    """Calibrate every hypothesis that is probable enough by NUTS.
+
+    Args:
+        case: data and gear.
+        hypotheses: their probabilities, sum 1.
+        library: effects by name.
+        seed: of the sampler.
+        progress: of it.
+        quick: calibrate nothing.
+    """
+    if quick:
+        return Refits({}, None, {})
+    probabilities = {_name(names): chance for names, chance in hypotheses.items()}
+    count, finished = len(_probable(probabilities)), 0
+
+    def calibrated(name: str) -> Posterior:
+        nonlocal finished
+        own, before = _parts(name), finished
+
+        def tell(done: int, total: int) -> None:
+            assert progress is not None
+            progress(before * total + done, total * max(count, before + 1))
+
+        finished += 1
+        return calibrate(
+            case,
+            effects=tuple(sorted(own - {UNKNOWN})),
+            with_gap=UNKNOWN in own,
+            adapt_noise=False,
+            seed=seed,
+            registry=library,
+            progress=progress and tell,
+        )
+
+    return weighed(probabilities, calibrated)
+
+
+def _name(names: Names) -> str:
+    """Return the name under which a model is stored."""
+    return "+".join(names).replace(OUTSIDE, UNKNOWN) or NONE
+
+
+def weighed(
+    probabilities: Mapping[str, float], calibrated: Callable[[str], Posterior]
+) -> Refits:
+    """Return the hypotheses that are kept, with what they carry.
+
+    Args:
+        probabilities: of all hypotheses, sum 1.
+        calibrated: returns the posterior of one.
+    """
+    chosen = _probable(probabilities)
+    fits = {name: calibrated(name) for name in chosen}
+    carrier = UNKNOWN
+    if _missing(probabilities, fits) > MOST_LEFT_OUT:
+        carrier = _open_model(probabilities, fits)
+        if carrier not in fits:
+            fits[carrier] = calibrated(carrier)
+        if not fits[carrier].usable and UNKNOWN not in fits:
+            fits[UNKNOWN] = calibrated(UNKNOWN)
+    usable = {name: fit for name, fit in fits.items() if fit.usable}
+    failed = {name: fit for name, fit in fits.items() if not fit.usable}
+    if not usable:
+        return Refits({}, None, failed)
+    missing = _missing(probabilities, fits)
+    carrier = carrier if carrier in usable else _widest(usable)
+    models = {
+        name: (probabilities.get(name, 0.0) + missing * (name == carrier), fit)
+        for name, fit in usable.items()
+    }
+    return Refits(models, LeftOut(missing, carrier), failed)
+
+
+def _probable(probabilities: Mapping[str, float]) -> list[str]:
+    """Return the hypotheses that are calibrated whatever the verdict."""
+    ranked = sorted(probabilities, key=lambda name: -probabilities[name])
+    return [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
+
+
+def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):
+    """Return the probability without a model that may be used."""
+    usable = [name for name, fit in fits.items() if fit.usable]
+    return max(1.0 - sum(probabilities.get(name, 0.0) for name in usable), 0.0)
+
+
+def _open_model(
+    probabilities: Mapping[str, float], fits: Mapping[str, Posterior]
+) -> str:
+    """Return the model with a leftover that suits most of what has no model.
+
+    What is the likeliest effect and a little more is no gap without that effect.
+    """
+    usable = {name for name, fit in fits.items() if fit.usable}
+    effects = frozenset().union(*map(_parts, usable)) - {UNKNOWN}
+
+    def share(effect: str, among: Iterable[str]) -> float:
+        return sum(probabilities[n] for n in among if effect in _parts(n))
+
+    rest = probabilities.keys() - usable
+    likeliest = max(sorted(effects), key=lambda e: share(e, probabilities), default="")
+    half = 0.5 * sum(probabilities[name] for name in rest)
+    alike = bool(likeliest) and share(likeliest, rest) > half
+    return f"{likeliest}+{UNKNOWN}" if alike else UNKNOWN
+
+
+def _parts(hypothesis: str) -> frozenset[str]:
+    """Return the effects of a hypothesis, and `unknown` where it has a leftover."""
+    return frozenset(hypothesis.split("+")) - {NONE}
+
+
+def _widest(fits: Mapping[str, Posterior]) -> str:
+    if UNKNOWN in fits:
+        return UNKNOWN
+    return max(fits, key=lambda name: float(np.std(fits[name].draws["stiffness"])))
+
+
+def failure_reasons(fits: Refits) -> tuple[str, ...]:
+    """Say why nothing may be used: every calibration failed."""
+    if fits.models:
+        return ()
+    return tuple(
+        f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
+        for name, fit in fits.failed.items()
+    )
