@@ -145,14 +145,21 @@ class Console:
             result: what to write and print.
             files: what `write_result` takes: names and content of the files.
         """
-        from hdcal.report.terminal_text import terminal_parts
-
-        folder = None
         if self.folder is not None:
             from hdcal.report.result_folder import write_result
 
             write_result(result, self.folder, command=self.command, **files)
-            folder = self.folder.name
+        return self.show_written(result)
+
+    def show_written(self, result: "Result") -> int:
+        """Print a result whose folder is written, and return the command's exit code.
+
+        Args:
+            result: what to print.
+        """
+        from hdcal.report.terminal_text import terminal_parts
+
+        folder = None if self.folder is None else self.folder.name
         self.table(*terminal_parts(result, folder))
         if self.json:
             self._print(result.to_json().rstrip(), to_error=False)

@@ -9,9 +9,9 @@ from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
-from hdcal.diagnosis.library import library_of
 from hdcal.explanation.closing import closed_on_left_out
 from hdcal.explanation.gap import Fitted, fitted, gap_by_row
+from hdcal.explanation.library import library_of
 from hdcal.explanation.next_run import rank_runs
 from hdcal.explanation.refit import Refits, failure_reasons, refit
 from hdcal.explanation.result import (

@@ -37,19 +37,10 @@ def write_result(
         tables: by the names of their CSV files.
         others: content of other files by their names.
     """
-    charts = result.charts()
-    kept = charts if figures is None else figures
-    drawn = {
-        name: images(chart, name, ("svg", "png") if name in kept else ("svg",))
-        for name, chart in charts.items()
-    }
-    page = html_page(result, command, {n: each["svg"] for n, each in drawn.items()})
     contents = {
         answer: result.to_json().encode(),
-        PAGE: page.encode("utf-8", "xmlcharrefreplace"),
+        **page_files(result, command, figures),
     }
-    for name in kept:
-        contents |= {f"{name}.{kind}": image for kind, image in drawn[name].items()}
     contents |= {
         name: columns_csv(dict(table)).encode()
         for name, table in (tables or {}).items()
@@ -58,3 +49,26 @@ def write_result(
     with target.filled() as folder:
         for name, content in contents.items():
             (folder / name).write_bytes(content)
+
+
+def page_files(
+    result: Result, command: str = "", figures: Collection[str] | None = None
+) -> dict[str, bytes]:
+    """Return the page of a result and its charts by the names of their files.
+
+    Args:
+        result: what to show.
+        command: the command line that made the result.
+        figures: names of the charts that become files too; by default all of them.
+    """
+    charts = result.charts()
+    kept = charts if figures is None else figures
+    drawn = {
+        name: images(chart, name, ("svg", "png") if name in kept else ("svg",))
+        for name, chart in charts.items()
+    }
+    page = html_page(result, command, {n: each["svg"] for n, each in drawn.items()})
+    files = {PAGE: page.encode("utf-8", "xmlcharrefreplace")}
+    for name in kept:
+        files |= {f"{name}.{kind}": image for kind, image in drawn[name].items()}
+    return files
