@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import betaln, entr, expit
+from scipy.stats import binomtest
 
 from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
 from hdcal.hypotheses.linear_problem import LinearProblem
@@ -18,6 +19,8 @@ _PRIOR_ODDS = 0.02
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
+# Probability by which wild readings lie on one side by chance.
+_CHANCE = 0.01
 # Sd of normal noise over its median absolute value.
 _MEDIAN_TO_SD = 1.4826
 
@@ -70,11 +73,15 @@ def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel
 
 
 class _Fit(NamedTuple):
-    """An EM fit of outliers: its bound, weights of rows, and the terms they leave."""
+    """An EM fit of outliers: its bound, weights of rows, and the terms they leave.
+
+    And the errors of the rows that are wild, zero of the others [N], shape (n,).
+    """
 
     bound: float
     weight: Float[np.ndarray, " n"]
     log_factor: float
+    wild: Float[np.ndarray, " n"]
 
 
 def outliers(
@@ -84,7 +91,8 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    The probabilities that rows are wild come from an EM fit. With any such
+    There is none where wild rows agree with their neighbours: that is structure. The
+    probabilities that rows are wild come from an EM fit. With any such
     probabilities the evidence of every hypothesis is a lower bound, which is tight
     where rows are clearly wild or clearly not.
 
@@ -99,6 +107,8 @@ def outliers(
         (_fit_outliers(problem, ratio, fitted) for ratio in ratios),
         key=lambda fit: fit.bound,
     )
+    if _agree(best.wild, problem.before):
+        return []
     grid = sorted({0.0, correlation})
     log_prior = np.log(_PRIOR_ODDS) + best.log_factor - np.log(_RATIOS * len(grid))
     weight = problem.weight * best.weight
@@ -122,4 +132,18 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
     bound = betaln(a + many, b + count - many) - betaln(a, b)
     bound += np.sum(entr(wild) + entr(1.0 - wild)) - many * np.log(ratio)
     log_factor = float(bound - np.sum(np.log(weight)))
-    return _Fit(float(bound - count * np.log(sd)), weight, log_factor)
+    found = np.where(wild > 0.5, error, 0.0)
+    return _Fit(float(bound - count * np.log(sd)), weight, log_factor, found)
+
+
+def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
+    """Tell whether wild rows err to the same side as wild rows before them too often.
+
+    Args:
+        wild: errors of wild rows, 0 of the others.
+        before: index of the row before each in its run, −1 for none.
+    """
+    pairs = wild * np.where(before >= 0, wild[before], 0.0)
+    same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))
+    found = all_pairs and binomtest(same, all_pairs, 0.5, "greater").pvalue < _CHANCE
+    return bool(found)
