@@ -1,5 +1,7 @@
 """The one formula equals dense multivariate normal densities."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import cycles, make_case, make_gear
@@ -12,6 +14,7 @@ from hdcal.hypotheses.evaluation import Selection
 from hdcal.hypotheses.linear_problem import Expansion, LinearProblem, linear_problem
 from hdcal.hypotheses.noise_models import NoiseModel
 from hdcal.hypotheses.parts import Context
+from hdcal.hypotheses.projection import Projection
 
 ROWS, NOISE, NAMES = 24, 0.4, ("one", "other", "outside")
 CLOSE = 1e-3
@@ -70,9 +73,9 @@ def evaluated(noise: NoiseModel, context: Context | None = None):
         precision=np.array([1.0, 0.0]),
         log_height=np.array([-0.5 * np.log(2.0 * np.pi), 0.0]),
     )
-    atoms = Atoms(
-        np.array([0, 1]), np.zeros((2, ROWS)), np.stack([BEND, BEND]), amplitude, none
-    )
+    owner, shape = np.array([0, 1]), np.zeros(2, int)
+    curves = np.zeros((2, ROWS)), np.stack([BEND, BEND])
+    atoms = Atoms(owner, shape, *curves, amplitude, none)
     space = Space(2, COLUMNS, np.array([0.3]), np.zeros(1))
     loose = np.zeros((2, 1, ROWS))
     selection = Selection(PROBLEM, atoms, loose, (space,), NAMES)
@@ -135,3 +138,30 @@ def test_few_nodes_are_enough(noise, monkeypatch):
     many = evaluated(noise)
     assert few.none == pytest.approx(many.none, abs=0.01)
     assert few.totals() == pytest.approx(many.totals(), abs=0.02)
+
+
+def test_rows_that_are_left_out_tell_nothing():
+    """The evidence is that of the other rows alone."""
+    left_out = np.arange(ROWS) >= ROWS - 5
+    rest = PROBLEM.without(left_out)
+    weight = np.where(left_out, 0.0, PROBLEM.weight)
+    noise = NoiseModel("", weight, 0.6, 0.0)
+    empty = Context(np.zeros(ROWS), np.zeros((0, ROWS)))
+    found = Projection(rest, noise, empty)
+    changed = replace(rest, y=rest.y + 100.0 * left_out)
+    again = Projection(changed, noise, empty)
+    assert rest.count == ROWS - 5
+    assert found.evidence_of_none() == pytest.approx(
+        again.evidence_of_none(), rel=1e-12
+    )
+    short = replace(
+        PROBLEM,
+        y=PROBLEM.y[:-5],
+        X=PROBLEM.X[:-5],
+        weight=PROBLEM.weight[:-5],
+        before=PROBLEM.before[:-5],
+    )
+    alone = NoiseModel("", short.weight, 0.6, 0.0)
+    few = Context(np.zeros(ROWS - 5), np.zeros((0, ROWS - 5)))
+    expected = Projection(short, alone, few).evidence_of_none()
+    assert found.evidence_of_none() == pytest.approx(expected, rel=1e-12)

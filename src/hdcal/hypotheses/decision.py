@@ -144,7 +144,7 @@ def decide_searched(
     on_noise = [
         (name,)
         for name in (GROWING, OUTLIERS)
-        if any(noise.name == name for noise in table.noises)
+        if name in searched.predicting.effects
     ]
     causes = [_cause(members, found) for members in [*groups, *on_noise]]
     explanations = _explanations(found)

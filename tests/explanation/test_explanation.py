@@ -1,0 +1,110 @@
+"""Where the gap lies, which effect causes it, and how far it closes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import rich, simulated
+from rigs import ramp
+from schema_checks import obeys
+
+from hdcal.explanation.closing import closed_on_left_out
+from hdcal.explanation.diagnose import diagnose
+from hdcal.explanation.gap import fitted, gap_by_row
+from hdcal.explanation.next_run import rank_runs
+from hdcal.explanation.result import Diagnosis
+from hdcal.hypotheses.decision import TEMPERATURE, decide_searched
+from hdcal.hypotheses.search import Searched, search
+from hdcal.physics.registry import EFFECTS
+
+HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
+
+
+@pytest.fixture(scope="module")
+def looped() -> Searched:
+    return search(simulated(rich(), HYSTERESIS, seed=1), EFFECTS)
+
+
+@pytest.fixture(scope="module")
+def plain() -> Searched:
+    return search(simulated(rich(), seed=1), EFFECTS)
+
+
+def closed(searched: Searched, name: str):
+    fit = fitted(searched, searched.table.posterior(TEMPERATURE), [name])
+    rng = np.random.default_rng(0)
+    return closed_on_left_out(searched, fit.noise, fit.noise_sd, [name], rng)[0]
+
+
+def test_the_true_effect_closes_the_gap_on_rows_it_never_saw(looped):
+    found = closed(looped, "hysteresis")
+    assert found is not None and found.median > 0.8 and found.lo > 0.5
+
+
+@pytest.mark.parametrize("name", ["screw_error", "progressive_stiffening"])
+def test_another_effect_does_not(looped, name):
+    found = closed(looped, name)
+    assert found is not None and found.hi < 0.3
+
+
+def test_no_gap_has_no_share_that_is_known(plain):
+    found = closed(plain, "hysteresis")
+    assert found is None or found.hi - found.lo > 0.5
+
+
+def test_the_gap_is_what_the_effect_adds(looped, plain):
+    """Both cases have the same noise: they differ by the effect alone."""
+    rng = np.random.default_rng(0)
+    found = gap_by_row(looped, looped.table.posterior(TEMPERATURE), rng)
+    added = looped.problem.project(looped.problem.y - plain.problem.y)
+    low, high = np.quantile(found.draws, [0.025, 0.975], axis=0)
+    assert np.mean((low <= added) & (added <= high)) > 0.8
+    middle = np.median(found.draws, axis=0)
+    assert np.sqrt(np.mean((middle - added) ** 2)) < 0.2 * np.std(added)
+    nothing = gap_by_row(plain, plain.table.posterior(TEMPERATURE), rng)
+    assert np.sqrt(np.mean(nothing.draws**2)) < 0.15 * np.std(added)
+
+
+def test_a_diagnosis_says_what_acts_and_how_much_of_the_gap_it_explains():
+    found = diagnose(simulated(rich(), HYSTERESIS, seed=1), quick=True)
+    (cause,) = found.which.acting
+    named = len(cause.members) == 1
+    assert found.which.verdict == ("named" if named else "group")
+    assert cause.members[0] == "hysteresis" and cause.probability > 0.9
+    assert cause.explains is not None and cause.explains.lo > 0.8
+    assert "Hysteresis" in found.headline and "explains" in found.headline
+    sizes = [rung.rms_N for rung in found.how_far.ladder]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[-1] == pytest.approx(found.gap.noise_sd_N)
+    assert found.gap.rms_N is not None
+    inside = found.gap.rms_N.lo, found.gap.rms_N.hi
+    assert inside[0] < np.sqrt(sizes[1] ** 2 - sizes[-1] ** 2) < 1.1 * inside[1]
+    obeys(found.to_dict(), Diagnosis)
+    assert {*found.charts()} == {"where", "which", "how_far"}
+    assert found.average is None and found.stiffness_N_per_mm is None
+
+
+def test_a_plain_case_has_no_gap_and_nothing_to_close():
+    found = diagnose(simulated(rich(), seed=3), quick=True)
+    assert found.which.verdict == "none" and not found.which.acting
+    assert found.how_far.closed is None and found.gap.probability < 0.5
+    obeys(found.to_dict(), Diagnosis)
+
+
+def test_runs_are_ranked_by_what_they_tell():
+    """A ramp cannot tell stiffening from other bends."""
+    case = simulated(ramp(60), {"progressive_stiffening": {"slope": 0.4}}, seed=1)
+    searched = search(case, EFFECTS)
+    rng = np.random.default_rng(0)
+    runs = rank_runs(searched, searched.table.posterior(TEMPERATURE), rng)
+    assert runs and all(run.information_nats >= 0.02 for run in runs)
+    assert all(one != two for one, two in (run.separates for run in runs))
+
+
+def test_a_stretch_of_rows_that_is_off_is_no_wild_reading():
+    case = simulated(rich(), seed=2)
+    force = np.array(case.records.force)
+    force[100:130] += 5.0
+    off = replace(case, records=replace(case.records, force=force))
+    found = decide_searched(search(off, EFFECTS))
+    assert found.effects["outliers"] < 0.1 and found.outside.acts > 0.5
