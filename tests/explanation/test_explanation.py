@@ -74,7 +74,7 @@ def test_a_diagnosis_says_what_acts_and_how_much_of_the_gap_it_explains():
     assert cause.explains is not None and cause.explains.lo > 0.8
     assert "Hysteresis" in found.headline and "explains" in found.headline
     sizes = [rung.rms_N for rung in found.how_far.ladder]
-    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[:-1] == sorted(sizes[:-1], reverse=True)
     assert sizes[-1] == pytest.approx(found.gap.noise_sd_N)
     assert found.gap.rms_N is not None
     inside = found.gap.rms_N.lo, found.gap.rms_N.hi
