@@ -17,7 +17,6 @@ TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
-    "FleetCauses": "shared_causes.summary.causes_report",
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
     "Response": "motion.respond.summary.response_report",
@@ -28,7 +27,6 @@ TABLES = {
     "Bands": "report.tables.own_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_table",
-    "FleetCauses": "shared_causes.summary.cause_columns",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
     "Response": "report.tables.own_columns",
@@ -39,7 +37,6 @@ TABLES = {
 CHARTS = {
     "Bands": "prediction.bands.charts.bands_chart",
     "Fleet": "fleets.chart.fleet_chart",
-    "FleetCauses": "shared_causes.chart.causes_chart",
     "NextForce": "fleets.force.chart.force_chart",
     "Response": "motion.respond.chart.response_chart",
     "Verdict": "diagnosis.chart.verdict_chart",

@@ -6,7 +6,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 import xarray as xr
-from fleets import handmade, shared
+from fleets import handmade
 from matplotlib.figure import Figure
 from moving import still_posterior
 from posteriors import single
@@ -41,7 +41,6 @@ def results():
     return {
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
         "Fleet": (handmade(), "% softer (95 %: "),
-        "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
         "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
         "NextForce": (handmade().next_force(0.4, 85.0), "gears to come need more"),

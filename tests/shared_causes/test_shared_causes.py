@@ -1,6 +1,7 @@
-"""What gears have in common is found, and nothing where there is nothing."""
+"""Causes that gears share, and no cause where there is none."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -9,13 +10,11 @@ from commands import Hdcal
 from schema_checks import obeys
 
 import hdcal
-from hdcal.diagnosis.model_posterior import carried, log_priors
-from hdcal.diagnosis.weighing import weigh
+from hdcal.hypotheses.noise_models import PRIOR_ODDS
+from hdcal.hypotheses.search import search
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.plain import as_plain
-from hdcal.shared_causes.answer import CausesAnswer
-from hdcal.shared_causes.gear_evidence import gears_of, weigh_gear
-from hdcal.shared_causes.summary import cause_columns, causes_answer
+from hdcal.shared_causes.gear_evidence import by_cause, gears_of, weigh_gear
+from hdcal.shared_causes.result import FleetCauses
 
 LIBRARY = {
     name: EFFECTS[name]
@@ -46,26 +45,56 @@ def with_loop():
     return hdcal.causes(hdcal.read_case(fleet(0.8)), library=LIBRARY)
 
 
-def test_the_gears_with_an_effect_are_told(with_loop):
+def causes_of(found: FleetCauses) -> list[tuple[str, ...]]:
+    return [tuple(each.causes.split(" / ")) for each in found.each_gear]
+
+
+def shared(found: FleetCauses, name: str):
+    return next(each for each in found.causes if each.cause == name)
+
+
+def test_the_gears_with_an_effect_are_named(with_loop):
     assert not with_loop.reasons
-    told = dict(zip(GEARS, with_loop.of_gears, strict=True))
-    assert all(told[gear] == ("coulomb_friction",) for gear in WITH_LOOP)
-    assert all("none" in told[gear] for gear in GEARS if gear not in WITH_LOOP)
-    place = with_loop.causes.index("coulomb_friction")
-    low, high = np.quantile(with_loop.share[:, place], [0.025, 0.975])
-    assert low < 4 / 7 < high and low > 0.15 and high < 0.95
-    # Gears say of each other what one alone does not.
-    chance = with_loop.chance[:4, place]
-    assert np.all(chance > with_loop.alone[:4, place])
-    answer = causes_answer(with_loop)
-    obeys(as_plain(answer), CausesAnswer)
+    named = dict(zip(GEARS, causes_of(with_loop), strict=True))
+    assert all(named[gear] == ("coulomb_friction",) for gear in WITH_LOOP)
+    assert all("none" in named[gear] for gear in GEARS if gear not in WITH_LOOP)
+    friction = shared(with_loop, "coulomb_friction")
+    assert friction.gears_named == 4
+    assert 0.15 < friction.share.lo < 4 / 7 < friction.share.hi < 0.99
+    # Other gears make the cause of a gear more probable.
+    for each in with_loop.each_gear[:4]:
+        assert each.probability > each.probability_alone
+    assert with_loop.used[0].gear in WITH_LOOP
+    obeys(with_loop.to_dict(), FleetCauses)
 
 
-def test_zeros_of_mountings_are_no_effect_of_a_gear():
+def test_every_way_to_show_it_names_what_it_found(with_loop):
+    assert "4 have coulomb friction" in with_loop.headline
+    assert with_loop.used[0].gear in with_loop.next_step
+    for shown in (with_loop.text(), with_loop.page(), with_loop._repr_html_()):
+        assert "coulomb friction" in shown
+    bars, points = with_loop.charts()["causes"].panels[0].marks
+    assert len(bars.at) == len(with_loop.common) >= 2
+    assert np.all((bars.low <= points.y) & (points.y <= bars.high))
+
+
+def test_offsets_of_runs_are_no_effect_of_a_gear():
     found = hdcal.causes(hdcal.read_case(fleet(0.0)), library=LIBRARY)
-    assert found.of_gears == [("none",)] * len(GEARS)
-    assert "run_offset" not in found.causes
-    assert causes_answer(found).next_step is None
+    assert causes_of(found) == [("none",)] * len(GEARS)
+    assert all(each.cause != "run_offset" for each in found.causes)
+    assert found.next_step is None
+
+
+def test_offsets_of_runs_of_any_size_leave_the_evidence_unchanged():
+    gear = gears_of(hdcal.read_case(fleet(0.8)))[0]
+    force = np.asarray(gear.records.force) + 5.0 * np.asarray(gear.records.run)
+    moved = replace(gear, records=replace(gear.records, force=force))
+    library = {"coulomb_friction": LIBRARY["coulomb_friction"]}
+    one, other = (weigh_gear(0, each, library, 0)[1] for each in (gear, moved))
+    for cause in one:
+        found = other[cause].log_evidence - other["none"].log_evidence
+        expected = one[cause].log_evidence - one["none"].log_evidence
+        assert found == pytest.approx(expected, abs=0.3)
 
 
 @pytest.mark.parametrize(("runs", "rows"), [(6, 3), (10, 3)])
@@ -78,41 +107,43 @@ def test_short_mountings_are_no_evidence(runs: int, rows: int):
         told = {"specimen": f"G{gear}", "run": run, "deformation_mm": x}
         parts.append(pd.DataFrame({**told, "force_N": 200.0 * x + noise}))
     found = hdcal.causes(pd.concat(parts), library=LIBRARY)
-    assert all(own[0] == "none" for own in found.of_gears)
-    place = found.causes.index("unknown")
-    assert found.log_evidence[:, place].sum() < 0.0
+    assert all(each[0] == "none" for each in causes_of(found))
+    assert shared(found, "outside").log_evidence_nat < 0.0
 
 
-def test_evidence_is_that_of_the_hypotheses():
-    """With hypotheses that a cause leads in, weighted as they are before the data."""
-    case = hdcal.read_case(fleet(0.8))
-    gear = gears_of(case)[0]
-    library = {"coulomb_friction": LIBRARY["coulomb_friction"]}
-    evidence = weigh(gear, library, np.random.default_rng(0)).evidence
-    table = {name: np.logaddexp.reduce(v) for name, v in evidence.table.items()}
-    names = list(table)
-    prior = dict(zip(names, np.exp(log_priors(names)), strict=True))
-    beside = "coulomb_friction+unknown"
-    carries = np.clip(carried(evidence)["coulomb_friction"], 1e-3, 1.0 - 1e-3)
-    alone, half = prior["coulomb_friction"], 0.5 * prior[beside]
-    parts = (
-        alone * np.exp(table["coulomb_friction"] - table["none"]),
-        half * np.exp(table[beside] - table["none"]) * 2.0 * carries,
-    )
-    told = weigh_gear(0, gear, library, 0)[1]
-    over = told["coulomb_friction"].log_evidence - told["none"].log_evidence
-    assert over == pytest.approx(np.log(sum(parts) / (alone + half)))
-    assert np.exp(told["coulomb_friction"].log_prior) == pytest.approx(alone + half)
+def test_evidence_is_the_mean_over_the_hypotheses():
+    gear = gears_of(hdcal.read_case(fleet(0.8)))[0]
+    library = {name: EFFECTS[name] for name in ("coulomb_friction", "outliers")}
+    searched = search(gear, library, free_runs=True)
+    table, found = searched.table, by_cause(searched, np.random.default_rng(0))
+    noises = np.array([model.name for model in table.noises])
+
+    def evidence(key, noise=""):
+        return np.logaddexp.reduce(table.log_evidence[key][noises == noise])
+
+    noisy = found["outliers"]
+    assert np.exp(noisy.log_prior) == pytest.approx(0.5 * PRIOR_ODDS)
+    expected = evidence((), "outliers") - np.log(PRIOR_ODDS)
+    assert noisy.log_evidence == pytest.approx(expected)
+    assert found["none"] == pytest.approx((evidence(()), np.log(0.5)))
+    # Every joint evidence belongs to one cause, whatever the shares are.
+    joint = [sum(each) for each in found.values()]
+    whole = [row + table.log_prior(key) for key, row in table.log_evidence.items()]
+    assert np.logaddexp.reduce(joint) == pytest.approx(np.logaddexp.reduce(whole, None))
+
+
+def assert_same(one: FleetCauses, other: FleetCauses) -> None:
+    assert causes_of(one) == causes_of(other)
+    for first, second in zip(one.causes, other.causes, strict=True):
+        assert first.cause == second.cause
+        assert first.log_evidence_nat == pytest.approx(second.log_evidence_nat, 1e-6)
 
 
 @pytest.mark.thorough
 def test_two_processes_say_the_same(with_loop):
     case = hdcal.read_case(fleet(0.8))
     again = hdcal.causes(case, library=LIBRARY, jobs=2)
-    for name in ("alone", "log_evidence"):
-        one, other = getattr(again, name), getattr(with_loop, name)
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9, err_msg=name)
-    assert again.of_gears == with_loop.of_gears
+    assert_same(again, with_loop)
 
 
 @pytest.mark.thorough
@@ -120,9 +151,7 @@ def test_a_cluster_says_the_same(with_loop, local):
     case = hdcal.read_case(fleet(0.8))
     address = local.scheduler_address
     again = hdcal.causes(case, library=LIBRARY, scheduler=address)
-    for name in ("alone", "log_evidence"):
-        one, other = getattr(again, name), getattr(with_loop, name)
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9, err_msg=name)
+    assert_same(again, with_loop)
 
 
 def test_gears_that_say_too_little_are_named():
@@ -143,8 +172,10 @@ def test_bad_gears_are_left_out_where_it_is_asked_for():
     table = fleet(0.8)
     table = table[(table.specimen != "G5") | (table.index % 12 == 0)]
     found = hdcal.causes(table, library=LIBRARY, skip_bad=True)
-    assert found.case.specimen_labels == tuple(g for g in GEARS if g != "G5")
-    assert found.of_gears[:4] == [("coulomb_friction",)] * 4
+    used = tuple(g for g in GEARS if g != "G5")
+    assert tuple(found.to_frame().gear) == (*used, "G5")
+    assert [*found.left_out] == ["G5"] and found.gears == 6
+    assert causes_of(found)[:4] == [("coulomb_friction",)] * 4
 
 
 def test_the_command_answers_and_says_what_it_wrote(here: Hdcal, tmp_path):
@@ -153,7 +184,7 @@ def test_the_command_answers_and_says_what_it_wrote(here: Hdcal, tmp_path):
     done = here("causes", "line.csv", "--library", f"minus:{others}", "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    obeys(answer, CausesAnswer)
+    obeys(answer, FleetCauses)
     assert answer["causes"][0]["cause"] == "coulomb_friction"
     table = pd.read_csv(tmp_path / "line-causes" / "gears.csv")
     assert table.gear.to_list() == [*GEARS]
@@ -168,12 +199,6 @@ def test_what_cannot_be_asked_is_one_finding_each(here: Hdcal, tmp_path):
     assert "takes 3 or more" in done.stderr
     assert "--library" in done.stderr and "--jobs" in done.stderr
     assert not (tmp_path / "line-causes").exists()
-
-
-def test_a_row_for_each_gear(with_loop):
-    columns = cause_columns(with_loop)
-    assert {len(column) for column in columns.values()} == {len(GEARS)}
-    assert np.all(columns["probability"] >= columns["probability_none"] - 1e-12)
 
 
 def test_plain_noise_is_no_evidence_of_outliers():

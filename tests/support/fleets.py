@@ -10,7 +10,6 @@ from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.misfit import Misfit
 from hdcal.fleets.readings import fleet_readings
 from hdcal.inference.checks import Check
-from hdcal.shared_causes.causes import FleetCauses
 
 
 def handmade() -> Fleet:
@@ -70,22 +69,4 @@ def handmade() -> Fleet:
             "warmup": 500,
             "draws": 200,
         },
-    )
-
-
-def shared() -> FleetCauses:
-    """Return what these gears have in common: the last one alone has an effect."""
-    rng = np.random.default_rng(0)
-    alone = np.array([[0.98, 0.01, 0.01]] * 3 + [[0.01, 0.98, 0.01]])
-    return FleetCauses(
-        case=handmade().case,
-        causes=("none", "relaxation", "unknown"),
-        share=rng.dirichlet([3.5, 1.1, 0.1], 50),
-        cause=np.tile([0, 0, 0, 1], (50, 1)),
-        chance=alone,
-        alone=alone,
-        log_evidence=np.log(alone / alone[:, :1]),
-        checks=handmade().checks,
-        library=("relaxation",),
-        seed=0,
     )

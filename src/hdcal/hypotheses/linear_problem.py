@@ -52,6 +52,8 @@ class LinearProblem:
         tolerance: smooth functions by which an effect's shape may deviate.
         log_shift: prior mean of the log stiffness less that of `base`.
         log_sd: prior sd of the log stiffness.
+        offsets: number of columns of X that are offsets of runs; their priors are so
+            wide that each takes a row.
     """
 
     records: Records
@@ -67,6 +69,7 @@ class LinearProblem:
     tolerance: Float[np.ndarray, "j n"]
     log_shift: float
     log_sd: float
+    offsets: int = 0
 
     @cached_property
     def root(self) -> Float[np.ndarray, "p p"]:
@@ -102,8 +105,8 @@ class LinearProblem:
 
     @property
     def count(self) -> int:
-        """Number of rows that count: those that are not left out."""
-        return int(np.count_nonzero(self.weight))
+        """Number of rows that count: not left out, nor used up by offsets of runs."""
+        return int(np.count_nonzero(self.weight)) - self.offsets
 
     def without(self, left_out: Bool[np.ndarray, " n"]) -> "LinearProblem":
         """Return the problem in which some rows tell nothing."""
@@ -136,7 +139,11 @@ class Expansion:
 
 
 def linear_problem(
-    case: Case, library: Mapping[str, type[Effect]], about: Expansion | None = None
+    case: Case,
+    library: Mapping[str, type[Effect]],
+    about: Expansion | None = None,
+    *,
+    free_runs: bool = False,
 ) -> LinearProblem:
     """Return the linear problem of a case.
 
@@ -144,6 +151,7 @@ def linear_problem(
         case: gear and records.
         library: effects whose priors are wanted, by name.
         about: the point of expansion; by default estimated.
+        free_runs: whether each run has an unknown force offset.
 
     Raises:
         InputError: an effect has no prior.
@@ -163,13 +171,15 @@ def linear_problem(
     columns = base_columns(records, reading, priors, base, log_sd)
     log_shift = log_mean - float(np.log(float(base.stiffness)))
     mean = base.force_offset + columns[:, 0] / log_sd * (1.0 + log_shift)
+    offsets = run_columns(records) if free_runs else np.zeros((len(mean), 0))
     return LinearProblem(
         records=records,
         reading=reading,
         base=base,
         priors=priors,
         y=np.asarray(records.force) - mean,
-        X=columns,
+        X=np.hstack([columns, offsets]),
+        offsets=offsets.shape[1],
         noise_sd=noise_sd,
         before=serial_correlation.previous_rows(records),
         weight=1.0 / np.sqrt(1.0 + (np.asarray(records.force_sd) / noise_sd) ** 2),
@@ -255,3 +265,13 @@ def base_columns(
     offset = np.full(len(rise), _moments(priors, "force_offset")[1])
     stiffness, modulus, zero = float(base.stiffness) * np.stack(slope)
     return np.stack([stiffness, offset, modulus, zero], axis=1)
+
+
+def run_columns(records: Records) -> Float[np.ndarray, "n r"]:
+    """Return what tells the force offsets of runs from their mean [N].
+
+    Their prior sd is the largest force: so wide that it favours no hypothesis.
+    """
+    runs, run = np.unique(records.run, return_inverse=True)
+    contrasts = np.eye(len(runs))[:, 1:] - 1.0 / len(runs)
+    return float(np.max(np.abs(records.force))) * contrasts[run]

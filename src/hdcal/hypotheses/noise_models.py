@@ -14,7 +14,7 @@ from hdcal.inference.distributions import frozen
 
 GROWING, OUTLIERS = "heteroscedastic_noise", "outliers"
 # Prior odds of each effect on the noise, whatever acts on the mean.
-_PRIOR_ODDS = 0.02
+PRIOR_ODDS = 0.02
 # Noise sd of the load alone at the largest force over the noise sd without load.
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
@@ -63,7 +63,7 @@ def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel
     z = share[:, None] / (sd * SCALES)
     density = np.sqrt(2.0 / np.pi) * (z * np.exp(-0.5 * z**2)) @ SCALE_WEIGHTS
     mass = np.maximum(np.log(2.0) * density, 1e-300)
-    log_prior = np.log(_PRIOR_ODDS) + np.log(mass)
+    log_prior = np.log(PRIOR_ODDS) + np.log(mass)
     # The geometric mean stays one, so that the reference noise sd keeps its meaning.
     mean = np.exp(np.mean(np.log(relative), axis=1, keepdims=True))
     return [
@@ -110,7 +110,7 @@ def outliers(
     if _agree(best.wild, problem.before):
         return []
     grid = sorted({0.0, correlation})
-    log_prior = np.log(_PRIOR_ODDS) + best.log_factor - np.log(_RATIOS * len(grid))
+    log_prior = np.log(PRIOR_ODDS) + best.log_factor - np.log(_RATIOS * len(grid))
     weight = problem.weight * best.weight
     return [NoiseModel(OUTLIERS, weight, c, float(log_prior)) for c in grid]
 

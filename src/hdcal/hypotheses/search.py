@@ -69,25 +69,28 @@ class Searched:
     coarse_step: float
 
 
-def search(case: Case, library: Mapping[str, type[Effect]]) -> Searched:
+def search(
+    case: Case, library: Mapping[str, type[Effect]], *, free_runs: bool = False
+) -> Searched:
     """Return the evidence of all hypotheses of a case.
 
     Args:
         case: gear and records.
         library: effects to consider, by name.
+        free_runs: whether each run has an unknown force offset, whatever acts.
 
     Raises:
         InputError: an effect has no prior.
     """
     case, _ = average_rows(with_coarse_step(case), MOST_ROWS)
-    problem = linear_problem(case, library)
+    problem = linear_problem(case, library, free_runs=free_runs)
     found = _Search(problem, library)
     found.alone(range(len(problem.correlations)))
     if _oversampled(problem, found.table):
-        return search(thin_rows(case, _STEP), library)
+        return search(thin_rows(case, _STEP), library, free_runs=free_runs)
     about = _expansion(problem, found.table)
     if about is not None:
-        problem = linear_problem(case, library, about)
+        problem = linear_problem(case, library, about, free_runs=free_runs)
         found = _Search(problem, library, found.kernels)
         found.alone(range(len(problem.correlations)))
     step = coarse_step(case, problem.noise_sd)
@@ -119,7 +122,8 @@ def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
     found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
     # The first coefficient is the deviation of the log stiffness from its prior mean.
     deviation = problem.log_shift + problem.log_sd * found.mean[0]
-    used = 3 + sum(len(part.columns) for part in parts)
+    # Of the base model the rows at one temperature determine all but one parameter.
+    used = problem.X.shape[1] - 1 + sum(len(part.columns) for part in parts)
     free = max(len(problem.y) - used, 1)
     noise_sd = float(np.sqrt(np.sum((problem.y - found.reading) ** 2) / free))
     moved = abs(deviation) > _SAME_STIFFNESS

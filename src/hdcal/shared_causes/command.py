@@ -40,7 +40,7 @@ def causes(
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
-    from hdcal.diagnosis.library import choose_library
+    from hdcal.explanation.library import choose_library
     from hdcal.physics.registry import EFFECTS
 
     with console.wrong as wrong:
@@ -49,17 +49,22 @@ def causes(
         effects = wrong.attempt(choose_library, library, EFFECTS)
         readings = read_gears(console, None, given | {"skip_bad": skip_bad})
         if readings is not None:
-            from hdcal.shared_causes.causes import gears_alone
+            from hdcal.shared_causes.causes import usable_gears
 
-            wrong.attempt(gears_alone, readings, skip_bad=skip_bad)
+            wrong.attempt(usable_gears, readings, skip_bad=skip_bad)
             out = f"{readings.case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None and effects is not None
     from hdcal.shared_causes.causes import causes as shared_causes
-    from hdcal.shared_causes.summary import causes_report
 
-    how = {"library": effects, "jobs": jobs, "scheduler": scheduler, "seed": seed}
-    how |= {"skip_bad": skip_bad}
     with progress_bar("weighing") as progress:
-        found = shared_causes(readings, progress=progress, **how)
-    return console.report(causes_report(found, console.command))
+        found = shared_causes(
+            readings,
+            library=effects,
+            jobs=jobs,
+            scheduler=scheduler,
+            skip_bad=skip_bad,
+            seed=seed,
+            progress=progress,
+        )
+    return console.show(found, tables={"gears.csv": found.to_frame()})

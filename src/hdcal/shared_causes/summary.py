@@ -1,143 +1,158 @@
-"""What gears have in common as an answer, and all that its result folder holds."""
+"""The result of many gears from draws of the frequencies of causes."""
 
-import shlex
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 
+from hdcal.data.case import Case
+from hdcal.data.measurements.bad_gears import cause as fault
 from hdcal.data.measurements.bad_gears import left_out_words
-from hdcal.diagnosis.naming import naming
-from hdcal.evidence.case_evidence import NONE, UNKNOWN
-from hdcal.fleets.left_out import left_out_of, with_left_out
-from hdcal.physics.registry import EFFECTS
-from hdcal.report.intervals import INTERVAL, credible_interval
-from hdcal.report.words import capital, label, percent
-from hdcal.report.write import Report
-from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause
-from hdcal.shared_causes.causes import TOLD, FleetCauses
-from hdcal.shared_causes.document import causes_document, headline
+from hdcal.data.theory_names import SPRING
+from hdcal.hypotheses.table import OUTSIDE
+from hdcal.inference.checks import Check
+from hdcal.report.item import Interval
+from hdcal.shared_causes.frequencies import Frequencies
+from hdcal.shared_causes.gear_evidence import NONE
+from hdcal.shared_causes.result import FleetCauses, GearCauses, LotCauses, SharedCause
 from hdcal.versions import versions
 
-
-def cause_columns(found: FleetCauses) -> dict[str, np.ndarray]:
-    """Return what each gear may have, the columns of gears.csv."""
-    names = np.array(found.causes)
-    return {
-        "gear": np.array(found.case.specimen_labels),
-        **({"lot": np.array(found.case.lots)} if found.case.lots else {}),
-        "rows": np.bincount(found.case.records.specimen),
-        "causes": np.array([" / ".join(own) for own in found.of_gears]),
-        "probability": found.chance.max(axis=1),
-        "probability_none": found.chance[:, found.causes.index(NONE)],
-        "alone": names[found.alone.argmax(axis=1)],
-        "probability_alone": found.alone.max(axis=1),
-        "status": np.full(len(found.chance), "failed" if found.reasons else "ok"),
-    }
+# Probability of the set of causes of a gear.
+_CREDIBLE = 0.9
+# Log odds that are substantial (Jeffreys, Theory of Probability, 1961).
+_SUBSTANTIAL = 0.5 * np.log(10.0)
 
 
-def causes_answer(found: FleetCauses) -> CausesAnswer:
-    """Return it as an answer, ready for JSON."""
-    failed = f"This result failed its checks: {'; '.join(found.reasons)}."
-    labels, of_gears = found.case.specimen_labels, found.of_gears
-    order = np.argsort(-found.share.mean(axis=0), kind="stable")
-    return CausesAnswer(
-        status="failed" if found.reasons else "ok",
-        reasons=found.reasons,
-        headline=failed if found.reasons else headline(labels, of_gears),
-        next_step=None if found.reasons else _next_step(found),
-        gears=len(labels),
-        rows=len(found.case.records.force),
-        left_out=left_out_of(found.case),
-        causes=tuple(_shared_cause(found, int(place)) for place in order),
-        lots=tuple(_lots(found)),
-        not_shown=tuple(n for n in found.library if n not in found.causes),
-        interval=INTERVAL,
-        notes=tuple(_notes(found)),
-        seed=found.seed,
-        versions=versions(),
-        data_sha256=found.case.data_sha256,
-    )
-
-
-def _shared_cause(found: FleetCauses, place: int) -> SharedCause:
-    name = found.causes[place]
-    return SharedCause(
-        cause=name,
-        gears_told=sum(own == (name,) for own in found.of_gears),
-        gears=credible_interval(np.sum(found.cause == place, axis=1)),
-        share=credible_interval(found.share[:, place]),
-        log_evidence_nat=float(found.log_evidence[:, place].sum()),
-        name_tested=naming().may_be_named(name) if name in EFFECTS else None,
-    )
-
-
-def _lots(found: FleetCauses) -> Iterator[LotWithCauses]:
-    lots, something = np.array(found.case.lots), found.cause != found.causes.index(NONE)
-    for lot in sorted({*found.case.lots}):
-        own = lots == lot
-        many = credible_interval(np.sum(something[:, own], axis=1))
-        yield LotWithCauses(lot, int(own.sum()), many)
-
-
-def _next_step(found: FleetCauses) -> str | None:
-    """Return whom to look at: the gear that most surely has something."""
-    nothing = found.chance[:, found.causes.index(NONE)]
-    odd = int(np.argmin(nothing))
-    if nothing[odd] > 1.0 - TOLD:
-        return None
-    gear = found.case.specimen_labels[odd]
-    alone = f"`--specimen {shlex.quote(gear)}`"
-    return f"See its size and where it lies: diagnose {gear} alone with {alone}."
-
-
-def _notes(found: FleetCauses) -> Iterator[str]:
-    left_out, many = found.case.left_out, len(found.case.specimen_labels)
-    if left_out:
-        yield left_out_words(left_out, many + len(left_out))
-    yield from found.case.notes
-    told = {own[0] for own in found.of_gears if len({*own} - {UNKNOWN}) == 1}
-    counted = naming().called
-    for name in sorted(told & counted.keys()):
-        yield (
-            f"{capital(label(name))} describes these gears best. In blind checks "
-            f"{percent(counted[name].rate)} of what it described best was something "
-            "else; that many gears look alike makes the name no surer."
-        )
-    for name in sorted(found.left_open):
-        yield (
-            f"Beside {label(name)} something unknown is left open: one gear by "
-            "itself does not tell them apart, and it would look the same in all."
-        )
-    hidden = [label(n) for n in found.library if n not in found.causes]
-    if hidden:
-        yield f"No gear was read so that these would show: {', '.join(hidden)}."
-
-
-def causes_report(found: FleetCauses, command: str = "") -> Report[CausesAnswer]:
-    """Return all that `hdcal causes` leaves behind.
+def fleet_causes(
+    *,
+    case: Case,
+    names: Sequence[str],
+    drawn: Frequencies,
+    alone: np.ndarray,
+    gain: np.ndarray,
+    checks: tuple[Check, ...],
+    library: Sequence[str],
+    seed: int,
+) -> FleetCauses:
+    """Return the result.
 
     Args:
-        found: what gears have in common.
-        command: that made it.
+        case: readings of all gears.
+        names: of the causes.
+        drawn: frequencies of causes, and the cause of each gear.
+        alone: probability of each cause by the gear alone, shape (g, k).
+        gain: log evidence of each cause over none, shape (g, k).
+        checks: of the sampler.
+        library: effects that were considered.
+        seed: of the random numbers.
     """
-
-    def figures():
-        from hdcal.shared_causes.figure import causes_figure
-
-        return {"causes": causes_figure(found)}
-
-    def charts():
-        from hdcal.shared_causes.chart import causes_chart
-
-        return {} if found.reasons else {"causes": [causes_chart(found)]}
-
-    answer, columns = causes_answer(found), cause_columns(found)
-    return Report(
-        causes_document(found, answer, columns, command),
-        answer,
-        "summary.json",
-        figures,
-        tables=lambda: {"gears.csv": with_left_out(columns, found.case)},
-        charts=charts,
-        theory=found.case.gear.theory,
+    share = drawn.share.reshape(-1, len(names))
+    cause = drawn.cause.reshape(len(share), -1)
+    confounded = _confounded(names, drawn.chance, alone)
+    sets = [_credible_set(names, row, confounded) for row in drawn.chance]
+    reasons = tuple(c.words for c in checks if c.outcome == "failed")
+    left_out = {gear: fault(why) for gear, why in case.left_out.items()}
+    notes = case.notes
+    if left_out:
+        notes = (left_out_words(case.left_out, len(sets) + len(left_out)), *notes)
+    return FleetCauses(
+        part="part" if case.gear.theory == SPRING else "gear",
+        units=case.units,
+        reasons=reasons,
+        gears=len(sets),
+        rows=len(case.records.force),
+        left_out=left_out,
+        causes=tuple(
+            SharedCause(
+                cause=names[k],
+                gears_named=sum(each == (names[k],) for each in sets),
+                gears=Interval.of(np.sum(cause == k, axis=1)),
+                share=Interval.of(share[:, k]),
+                log_evidence_nat=float(gain[:, k].sum()),
+            )
+            for k in np.argsort(-share.mean(axis=0), kind="stable")
+        ),
+        lots=_lots(case, cause != names.index(NONE)),
+        not_shown=tuple(name for name in library if name not in names),
+        confounded=confounded,
+        notes=notes,
+        seed=seed,
+        draws=len(share),
+        versions=versions(),
+        data_sha256=case.data_sha256,
+        each_gear=(
+            *_rows(case, names, sets, drawn.chance, alone, failed=bool(reasons)),
+            *(
+                GearCauses(gear=g, status=f"left out: {why}")
+                for g, why in left_out.items()
+            ),
+        ),
+        checks=checks,
+        name=case.name,
     )
+
+
+def _confounded(
+    names: Sequence[str], chance: np.ndarray, alone: np.ndarray
+) -> tuple[str, ...]:
+    """Return effects that gears alone do not separate from something outside."""
+    if OUTSIDE not in names:
+        return ()
+    log_alone = np.log(np.maximum(alone, np.finfo(float).tiny))
+    odds = log_alone - log_alone[:, [names.index(OUTSIDE)]]
+    likeliest = chance.argmax(axis=1)
+    return tuple(
+        names[k]
+        for k in np.unique(likeliest)
+        if names[k] not in (NONE, OUTSIDE)
+        and np.mean(odds[likeliest == k, k]) < _SUBSTANTIAL
+    )
+
+
+def _credible_set(
+    names: Sequence[str], chance: np.ndarray, confounded: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the fewest causes with the credible probability, the likeliest first."""
+    order = np.argsort(-chance, kind="stable")
+    many = 1 + int(np.sum(np.cumsum(chance[order]) < _CREDIBLE))
+    found = tuple(names[k] for k in order[:many])
+    add = found[0] in confounded and OUTSIDE not in found
+    return (*found, OUTSIDE) if add else found
+
+
+def _lots(case: Case, something: np.ndarray) -> tuple[LotCauses, ...]:
+    lots = np.array(case.lots)
+    return tuple(
+        LotCauses(
+            lot=lot,
+            gears=int(np.sum(lots == lot)),
+            gears_with_effect=Interval.of(something[:, lots == lot].sum(axis=1)),
+        )
+        for lot in sorted({*case.lots})
+    )
+
+
+def _rows(
+    case: Case,
+    names: Sequence[str],
+    sets: Sequence[tuple[str, ...]],
+    chance: np.ndarray,
+    alone: np.ndarray,
+    *,
+    failed: bool,
+) -> list[GearCauses]:
+    """Return a row for each gear."""
+    rows = np.bincount(case.records.specimen)
+    return [
+        GearCauses(
+            gear=gear,
+            lot=case.lots[k] if case.lots else None,
+            rows=int(rows[k]),
+            causes=" / ".join(sets[k]),
+            probability=float(chance[k].max()),
+            probability_none=float(chance[k, names.index(NONE)]),
+            alone=names[int(alone[k].argmax())],
+            probability_alone=float(alone[k].max()),
+            status="failed" if failed else "ok",
+        )
+        for k, gear in enumerate(case.specimen_labels)
+    ]

@@ -1,0 +1,168 @@
+"""The causes of many gears as a result."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, InstanceOf
+
+from hdcal.inference.checks import Check
+from hdcal.report.chart_spec import ORANGE, Bars, Chart, Panel, Points
+from hdcal.report.item import (
+    INTERVAL,
+    Count,
+    Digest,
+    EffectName,
+    Interval,
+    Item,
+    Probability,
+    Words,
+    quantity,
+)
+from hdcal.report.result import Result
+from hdcal.report.words import label
+from hdcal.shared_causes.gear_evidence import NONE
+
+# Causes of a smaller share of gears are in the JSON answer alone.
+RARE = 0.01
+
+
+class SharedCause(Item):
+    """One cause over all gears.
+
+    Attributes:
+        cause: none, an effect by its name, or outside the library.
+        gears_named: gears in which it alone has a probability of 0.9 or more.
+        gears: of these, how many have it.
+        share: of gears to come that have it.
+        log_evidence_nat: of the readings of all gears, if each had it, over none.
+    """
+
+    cause: EffectName
+    gears_named: Count
+    gears: Interval
+    share: Interval
+    log_evidence_nat: float
+
+
+class LotCauses(Item):
+    """A lot, and how many of its gears have an effect or something outside."""
+
+    lot: Words
+    gears: Count
+    gears_with_effect: Interval
+
+
+class GearCauses(Item):
+    """One gear: a row of gears.csv.
+
+    Attributes:
+        gear: its label.
+        lot: empty if lots are not stated.
+        rows: of the gear.
+        causes: the fewest that have a probability of 0.9, the likeliest first.
+        probability: of the likeliest cause, given all gears.
+        probability_none: that the gear has no effect.
+        alone: the likeliest cause by the readings of this gear alone.
+        probability_alone: of that one.
+        status: ok, failed, or why the gear is left out.
+    """
+
+    gear: Words
+    lot: str | None = None
+    rows: Count | None = None
+    causes: str = ""
+    probability: Probability | None = quantity("probability", default=None)
+    probability_none: Probability | None = quantity("no effect", default=None)
+    alone: str = ""
+    probability_alone: Probability | None = None
+    status: Words
+
+    @property
+    def kind(self) -> tuple[str, ...]:
+        """The causes; empty where it is not clear whether there is any effect."""
+        names = tuple(self.causes.split(" / "))
+        return () if NONE in names and names != (NONE,) else names
+
+
+class FleetCauses(Result):
+    """What `hdcal causes` answers; summary.json.
+
+    Attributes:
+        gears: number of gears.
+        rows: number of their rows.
+        left_out: gears in none of the numbers, each with the reason.
+        causes: those that were considered, the most frequent first.
+        lots: if they are stated.
+        not_shown: effects of the library without a prediction for any gear.
+        confounded: causes that one gear alone does not separate from something outside
+            the library, which many gears do not separate better.
+        notes: from reading.
+        seed: of the random numbers.
+        draws: of the sampler.
+        versions: of the packages.
+        data_sha256: of the data.
+        each_gear: the rows of gears.csv.
+        checks: of the sampler.
+        name: of the case.
+    """
+
+    template = "shared_causes/report.md.j2"
+    table = "each_gear"
+
+    format: Literal["hdcal.causes/2"] = "hdcal.causes/2"
+    interval: float = INTERVAL
+    gears: Count
+    rows: Count
+    left_out: dict[str, Words]
+    causes: tuple[SharedCause, ...]
+    lots: tuple[LotCauses, ...]
+    not_shown: tuple[EffectName, ...]
+    confounded: tuple[EffectName, ...]
+    notes: tuple[str, ...]
+    seed: Count
+    draws: Count
+    versions: dict[str, str]
+    data_sha256: Digest
+    each_gear: tuple[GearCauses, ...] = Field(exclude=True)
+    checks: tuple[InstanceOf[Check], ...] = Field(exclude=True)
+    name: str = Field(exclude=True)
+
+    @property
+    def used(self) -> tuple[GearCauses, ...]:
+        """The gears that are not left out, those most surely with an effect first."""
+        kept = [each for each in self.each_gear if each.probability_none is not None]
+        return tuple(sorted(kept, key=lambda each: each.probability_none or 0.0))
+
+    @property
+    def kinds(self) -> dict[tuple[str, ...], list[str]]:
+        """Gears by the causes that they may have, the most frequent first."""
+        found: dict[tuple[str, ...], list[str]] = {}
+        for each in self.each_gear:
+            if each.probability_none is not None:
+                found.setdefault(each.kind, []).append(each.gear)
+        return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+
+    @property
+    def common(self) -> tuple[SharedCause, ...]:
+        """Causes that are frequent enough to be shown."""
+        return tuple(c for c in self.causes if c.share.median >= RARE or c.gears_named)
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the share of each cause among gears to come."""
+        at = np.arange(1.0, len(self.common) + 1.0)
+        shares = [each.share for each in self.common]
+        low, middle, high = 100.0 * np.array([(s.lo, s.median, s.hi) for s in shares]).T
+        panel = Panel(
+            x="",
+            y="share of gears to come [%]",
+            marks=[
+                Bars(label="95 % interval", at=at, low=low, high=high),
+                Points(label="median", x=at, y=middle, colour=ORANGE),
+            ],
+            names=[label(each.cause) for each in self.common],
+            horizontal=True,
+            y_limits=(0.0, 100.0),
+            wide=True,
+        )
+        return {"causes": Chart(panels=[panel])}
