@@ -126,13 +126,9 @@ def told(place: int, seed: int) -> tuple[Counter[tuple[bool, str]], bool]:
     """
     readings, affected = simulated(place, seed)
     found = hdcal.causes(readings, seed=seed)
-    words = (
-        "not clear" if "none" in own and len(own) > 1 else " / ".join(sorted(own))
-        for own in found.of_gears
-    )
-    share = found.share[:, found.causes.index("none")]
-    low, high = np.quantile(share, [0.025, 0.975])
-    inside = bool(low <= 1.0 - KINDS[place].share <= high)
+    words = (" / ".join(sorted(each.kind)) or "not clear" for each in found.each_gear)
+    share = next(each.share for each in found.causes if each.cause == "none")
+    inside = bool(share.lo <= 1.0 - KINDS[place].share <= share.hi)
     return Counter(zip(affected.tolist(), words, strict=True)), inside
 
 
