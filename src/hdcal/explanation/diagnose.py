@@ -9,6 +9,7 @@ from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
+from hdcal.explanation.charts import FORMULA
 from hdcal.explanation.closing import closed_on_left_out
 from hdcal.explanation.gap import Fitted, fitted, gap_by_row
 from hdcal.explanation.library import library_of
@@ -30,6 +31,7 @@ from hdcal.explanation.result import (
     Which,
 )
 from hdcal.explanation.seen import what_is_seen
+from hdcal.explanation.wording import effect_words
 from hdcal.hypotheses.decision import (
     TEMPERATURE,
     CauseClass,
@@ -45,7 +47,6 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.pooled import pool
 from hdcal.report.item import Interval
-from hdcal.report.words import label
 from hdcal.versions import versions
 
 
@@ -199,7 +200,7 @@ def _how_far(
 def _model(added: str) -> str:
     if not added:
         return "calibrated straight model"
-    return "and outside the library" if added == OUTSIDE else f"and {label(added)}"
+    return f"+ {'outside the library' if added == OUTSIDE else effect_words(added)}"
 
 
 def _formula(case: Case, searched: Searched) -> Rung:
@@ -211,4 +212,4 @@ def _formula(case: Case, searched: Searched) -> Rung:
     soft = 1.0 - float(searched.problem.base.alpha) * rise
     radial = np.asarray(records.deformation) * reading.radial_per_read
     left = np.asarray(records.force) - stiffness * soft * radial
-    return Rung(model="formula with K = 1", rms_N=float(np.sqrt(np.mean(left**2))))
+    return Rung(model=FORMULA, rms_N=float(np.sqrt(np.mean(left**2))))
