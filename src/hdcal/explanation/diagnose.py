@@ -39,6 +39,7 @@ from hdcal.hypotheses.decision import (
     decide_searched,
 )
 from hdcal.hypotheses.decision import Interval as Found
+from hdcal.hypotheses.noise_models import OUTLIERS
 from hdcal.hypotheses.search import Searched, search
 from hdcal.hypotheses.table import OUTSIDE
 from hdcal.inference.sample import Progress
@@ -193,7 +194,9 @@ def _how_far(
         for name, size in fit.rms.items()
         if name != OUTSIDE or len(fit.rms) > 1
     ]
-    ladder.append(Rung(model="noise", rms_N=fit.noise_sd))
+    wild = fit.noise.name == OUTLIERS
+    noise = "noise without wild readings" if wild else "noise"
+    ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
     return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
 
 

@@ -10,8 +10,7 @@ from hdcal.explanation.charts import gap_chart, ladder_chart, which_chart
 from hdcal.explanation.gap import GapByRow
 from hdcal.explanation.next_run import NextRun
 from hdcal.explanation.seen import Seen
-from hdcal.explanation.wording import effect_words, either, share_words
-from hdcal.hypotheses.noise_models import GROWING, OUTLIERS
+from hdcal.explanation.wording import either, on_noise, share_words, together
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart
@@ -71,7 +70,7 @@ class Cause(Item):
     @property
     def on_noise(self) -> bool:
         """Whether they act on the noise, not on the mean reading."""
-        return bool({*self.members} & {GROWING, OUTLIERS})
+        return any(map(on_noise, self.members))
 
     @property
     def merged(self) -> bool:
@@ -107,7 +106,7 @@ class Explanation(Item):
         """The explanation in a sentence."""
         if self.outside:
             return "something outside the library"
-        return " and ".join(map(effect_words, self.effects)) or "no gap"
+        return together(self.effects) or "no gap"
 
 
 class Which(Item):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from hdcal.hypotheses.noise_models import GROWING
+from hdcal.hypotheses.noise_models import GROWING, OUTLIERS
 from hdcal.report.item import Interval
 from hdcal.report.words import label
 
@@ -17,9 +17,19 @@ ALL, _LITTLE = 0.99, 0.01
 _MOST = 3
 
 
+def on_noise(name: str) -> bool:
+    """Whether an effect acts on the noise, not on the mean reading."""
+    return name in (GROWING, OUTLIERS)
+
+
 def effect_words(name: str) -> str:
     """Return what an effect is called in a sentence."""
     return _WORDS.get(name, label(name))
+
+
+def together(effects: Sequence[str]) -> str:
+    """Return effects that act together, those on the noise last."""
+    return " + ".join(map(effect_words, sorted(effects, key=on_noise)))
 
 
 def either(members: Sequence[str], most: int = _MOST) -> str:
