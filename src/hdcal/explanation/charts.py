@@ -1,6 +1,6 @@
 """Charts of a diagnosis: where the gap lies, which effects act, how far it closes."""
 
-from collections.abc import Iterator
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,15 +8,18 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.loading import movement_words
 from hdcal.explanation.gap import GapByRow
+from hdcal.explanation.wording import ALL, either
 from hdcal.quantities import Quantities
 from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.chart_spec import (
     BLUE,
     GREY,
     ORANGE,
+    SKY,
     Band,
     Bars,
     Chart,
+    Line,
     Mark,
     Panel,
     Points,
@@ -24,36 +27,50 @@ from hdcal.report.chart_spec import (
     drawn_rows,
 )
 from hdcal.report.item import INTERVAL
-from hdcal.report.words import label
+from hdcal.report.words import percent
 
 if TYPE_CHECKING:
-    from hdcal.explanation.result import HowFar, Which
+    from hdcal.explanation.result import Cause, HowFar, Which
 
-# Bins of the deformation in which the band of the gap is drawn, classes that are shown,
-# and the least probability of one.
-_BINS, _MOST, _LEAST = 12, 8, 0.01
+# Classes that are shown, the least probability of one, and from which on its share of
+# the gap is written with it.
+_MOST, _LEAST, _LIKELY = 8, 0.01, 0.5
+# Names of a class beside its bar.
+_NAMES = 3
+# With more half cycles than this bands would cover each other: medians stay.
+_MOST_BANDS = 40
 _COLOURS = {1: BLUE, -1: ORANGE}
+# What the formula leaves hides the rest of the ladder, and stays in the table.
+FORMULA = "formula with K = 1"
 
 
 def gap_chart(case: Case, rows: GapByRow) -> Chart:
-    """Return residuals over deformation with the posterior of the gap as a band."""
-    records, marks = rows.records, list[Mark]()
+    """Return residuals over deformation with the posterior of the gap as bands."""
+    records, points, bands, lines = rows.records, list[Mark](), list[Mark](), []
     x, sense = np.asarray(records.deformation), np.asarray(records.sense)
     words = movement_words(x, case.units.displacement)
     drawn = drawn_rows(rows.residual)
+    halves = _half_cycles(sense, np.asarray(records.run))
     for way, colour in _COLOURS.items():
         here = sense == way
         if not here.any():
             continue
         some = drawn[here[drawn]]
-        marks.append(
+        points.append(
             Points(label=words[way], x=x[some], y=rows.residual[some], colour=colour)
         )
-        marks += _band(x[here], rows.draws[:, here], f"gap, {words[way]}", colour)
+        some = [half for half in halves if here[half[0]] and len(half) > 1]
+        # One entry of the legend is enough for all half cycles.
+        names = [f"gap, {words[way]}", *[""] * len(some)]
+        for name, half in zip(names, some, strict=False):
+            band, line = _gap(x, rows.draws, half, name, colour, len(some))
+            lines.append(line)
+            if len(some) <= _MOST_BANDS:
+                bands.append(band)
     panel = Panel(
         x=displacement_axis(case),
         y=load_axis(case.units, "measured − model"),
-        marks=[*marks, Rule(at=0.0)],
+        marks=[Rule(at=0.0), *bands, *points, *lines],
         title=f"{case.name}: what the straight model leaves",
         wide=True,
         height=4.0,
@@ -62,57 +79,94 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
     return Chart(panels=[panel])
 
 
-def _band(x: np.ndarray, draws: np.ndarray, words: str, colour: str) -> Iterator[Band]:
-    """Yield the interval of the gap's mean in ranges of the deformation."""
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, min(_BINS, x.size) + 1)))
-    if edges.size < 3:
-        return
-    place = np.clip(np.searchsorted(edges, x, "right") - 1, 0, edges.size - 2)
-    count = np.bincount(place, minlength=edges.size - 1)
-    mean = np.stack([np.bincount(place, row, edges.size - 1) for row in draws])
-    kept = count > 0
+def _half_cycles(sense: np.ndarray, run: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of each stretch of one direction within a run."""
+    turns = np.flatnonzero((np.diff(sense) != 0) | (np.diff(run) != 0)) + 1
+    return np.split(np.arange(len(sense)), turns)
+
+
+def _gap(
+    x: np.ndarray,
+    draws: np.ndarray,
+    half: np.ndarray,
+    name: str,
+    colour: str,
+    count: int,
+) -> tuple[Band, Line]:
+    """Return interval and median of the gap over the rows of a half cycle.
+
+    Bands of many half cycles, `count`, lie over each other: each is paler.
+    """
+    rows = half[np.argsort(x[half], kind="stable")]
     tail = (1.0 - INTERVAL) / 2.0
-    low, high = np.quantile(mean[:, kept] / count[kept], [tail, 1.0 - tail], axis=0)
-    middle = (0.5 * (edges[1:] + edges[:-1]))[kept]
-    yield Band(label=words, x=middle, low=low, high=high, colour=colour)
+    low, middle, high = np.quantile(draws[:, rows], [tail, 0.5, 1.0 - tail], axis=0)
+    band = Band(
+        label=name,
+        x=x[rows],
+        low=low,
+        high=high,
+        colour=colour,
+        opacity=max(0.35 / np.sqrt(count), 0.08),
+    )
+    return band, Line(label=name, x=x[rows], y=middle, colour=colour, width=0.8)
 
 
 def which_chart(which: "Which") -> Chart:
-    """Return the probability of each class of effects."""
+    """Return the probability of each class of effects, and of anything else."""
     shown = [c for c in which.causes if c.probability >= _LEAST][:_MOST]
-    names = [_names(each.members) for each in shown] + ["outside the library"]
-    chances = [each.probability for each in (*shown, which.outside)]
-    bars = Bars(at=np.arange(1.0, len(names) + 1.0), high=np.array(chances))
-    panel = Panel(
+    causes = [c for c in shown if not c.on_noise]
+    noise = [c for c in shown if c.on_noise]
+    bars, at = list[Mark](), 1.0
+    groups = (causes, BLUE), ([which.outside], ORANGE), (noise, GREY)
+    for group, colour in groups:
+        if group:
+            chances = np.array([each.probability for each in group])
+            bars.append(
+                Bars(at=at + np.arange(len(group)), high=chances, colour=colour)
+            )
+            at += len(group)
+    names = [_name(each) for each in (*causes, which.outside, *noise)]
+    return Chart(panels=[_ranked("probability that it acts", bars, names, (0.0, 1.0))])
+
+
+def _name(cause: "Cause") -> str:
+    words = either(cause.members, _NAMES) if cause.members else "outside the library"
+    if cause.explains and cause.probability > _LIKELY:
+        share = cause.explains.median
+        words += f": {'all' if share >= ALL else percent(share)} of the gap"
+    return words
+
+
+def _ranked(
+    axis: str,
+    bars: list[Mark],
+    names: list[str],
+    limits: tuple[float | None, float | None] = (None, None),
+) -> Panel:
+    """Return a panel of bars with room for long names."""
+    lines = max((len(wrap(name, 40)) for name in names), default=1)
+    return Panel(
         x="",
-        y="probability that it acts",
-        marks=[bars],
+        y=axis,
+        marks=bars,
         names=names,
         horizontal=True,
-        y_limits=(0.0, 1.0),
+        y_limits=limits,
         wide=True,
+        height=1.0 + (0.2 + 0.15 * lines) * max(len(names), 2),
     )
-    return Chart(panels=[panel])
-
-
-def _names(members: tuple[str, ...]) -> str:
-    first = " or ".join(map(label, members[:2]))
-    return f"{first} or {len(members) - 2} more" if len(members) > 2 else first
 
 
 def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
-    """Return what each model leaves of the readings, from the formula to the noise."""
-    rms = np.array([rung.rms_N for rung in far.ladder])
+    """Return what each model leaves, from the straight model to the noise."""
+    rungs = [rung for rung in far.ladder if rung.model != FORMULA]
+    rms = np.array([rung.rms_N for rung in rungs])
     at = np.arange(1.0, len(rms) + 1.0)
-    panel = Panel(
-        x="",
-        y=load_axis(units, "root mean square of what is left"),
-        marks=[
-            Bars(at=at[:-1], high=rms[:-1]),
-            Bars(at=at[-1:], high=rms[-1:], colour=GREY),
-        ],
-        names=[rung.model for rung in far.ladder],
-        horizontal=True,
-        wide=True,
-    )
-    return Chart(panels=[panel])
+    bars: list[Mark] = [
+        Bars(at=at[:1], high=rms[:1], colour=SKY),
+        Bars(at=at[1:-1], high=rms[1:-1], colour=BLUE),
+        Bars(at=at[-1:], high=rms[-1:], colour=GREY),
+    ]
+    axis = load_axis(units, "root mean square of what is left")
+    bars = [each for each in bars if isinstance(each, Bars) and len(each.at)]
+    return Chart(panels=[_ranked(axis, bars, [rung.model for rung in rungs])])

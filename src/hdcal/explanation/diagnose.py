@@ -9,6 +9,7 @@ from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
+from hdcal.explanation.charts import FORMULA
 from hdcal.explanation.closing import closed_on_left_out
 from hdcal.explanation.gap import Fitted, fitted, gap_by_row
 from hdcal.explanation.library import library_of
@@ -30,6 +31,7 @@ from hdcal.explanation.result import (
     Which,
 )
 from hdcal.explanation.seen import what_is_seen
+from hdcal.explanation.wording import effect_words
 from hdcal.hypotheses.decision import (
     TEMPERATURE,
     CauseClass,
@@ -37,6 +39,7 @@ from hdcal.hypotheses.decision import (
     decide_searched,
 )
 from hdcal.hypotheses.decision import Interval as Found
+from hdcal.hypotheses.noise_models import OUTLIERS
 from hdcal.hypotheses.search import Searched, search
 from hdcal.hypotheses.table import OUTSIDE
 from hdcal.inference.sample import Progress
@@ -45,7 +48,6 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.pooled import pool
 from hdcal.report.item import Interval
-from hdcal.report.words import label
 from hdcal.versions import versions
 
 
@@ -192,14 +194,16 @@ def _how_far(
         for name, size in fit.rms.items()
         if name != OUTSIDE or len(fit.rms) > 1
     ]
-    ladder.append(Rung(model="noise", rms_N=fit.noise_sd))
+    wild = fit.noise.name == OUTLIERS
+    noise = "noise without wild readings" if wild else "noise"
+    ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
     return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
 
 
 def _model(added: str) -> str:
     if not added:
         return "calibrated straight model"
-    return "and outside the library" if added == OUTSIDE else f"and {label(added)}"
+    return f"+ {'outside the library' if added == OUTSIDE else effect_words(added)}"
 
 
 def _formula(case: Case, searched: Searched) -> Rung:
@@ -211,4 +215,4 @@ def _formula(case: Case, searched: Searched) -> Rung:
     soft = 1.0 - float(searched.problem.base.alpha) * rise
     radial = np.asarray(records.deformation) * reading.radial_per_read
     left = np.asarray(records.force) - stiffness * soft * radial
-    return Rung(model="formula with K = 1", rms_N=float(np.sqrt(np.mean(left**2))))
+    return Rung(model=FORMULA, rms_N=float(np.sqrt(np.mean(left**2))))

@@ -70,8 +70,8 @@ def gap_by_row(
         elif count:
             curves = sampled_curves(problem, noise, parts, int(count), rng)
             draws.append(curves.sum(axis=0) / noise.weight)
-    plain = table.likeliest_noise(())
-    residual = problem.y - posterior(problem, plain, []).reading
+    # The gap is projected in the same way, so that it lies among the residuals.
+    residual = problem.project(problem.y)
     return GapByRow(problem.records, residual, np.concatenate(draws))
 
 

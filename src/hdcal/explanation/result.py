@@ -10,6 +10,7 @@ from hdcal.explanation.charts import gap_chart, ladder_chart, which_chart
 from hdcal.explanation.gap import GapByRow
 from hdcal.explanation.next_run import NextRun
 from hdcal.explanation.seen import Seen
+from hdcal.explanation.wording import either, on_noise, share_words, together
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart
@@ -66,6 +67,26 @@ class Cause(Item):
     probability: Probability
     explains: Interval | None
 
+    @property
+    def on_noise(self) -> bool:
+        """Whether they act on the noise, not on the mean reading."""
+        return any(map(on_noise, self.members))
+
+    @property
+    def merged(self) -> bool:
+        """Whether they are several."""
+        return len(self.members) > 1
+
+    @property
+    def words(self) -> str:
+        """The effects in a sentence."""
+        return either(self.members)
+
+    @property
+    def share(self) -> str:
+        """The share of the gap in a sentence; empty where none is known."""
+        return share_words(self.explains) if self.explains else ""
+
 
 class Explanation(Item):
     """Effects that together explain the readings.
@@ -79,6 +100,13 @@ class Explanation(Item):
     effects: tuple[EffectName, ...]
     outside: bool
     probability: Probability
+
+    @property
+    def words(self) -> str:
+        """The explanation in a sentence."""
+        if self.outside:
+            return "something outside the library"
+        return together(self.effects) or "no gap"
 
 
 class Which(Item):
@@ -110,9 +138,19 @@ class Which(Item):
         return tuple(each for each in self.causes if each.probability > LIKELY)
 
     @property
-    def merged(self) -> bool:
-        """Whether an acting class has several effects."""
-        return any(len(each.members) > 1 for each in self.acting)
+    def on_mean(self) -> tuple[Cause, ...]:
+        """Acting classes on the mean reading, those that explain most first."""
+        found = [each for each in self.acting if not each.on_noise]
+        return tuple(sorted(found, key=_explained, reverse=True))
+
+    @property
+    def on_noise(self) -> tuple[Cause, ...]:
+        """Acting effects on the noise."""
+        return tuple(each for each in self.acting if each.on_noise)
+
+
+def _explained(cause: Cause) -> float:
+    return cause.explains.median if cause.explains else 0.0
 
 
 class Rung(Item):
@@ -135,6 +173,11 @@ class HowFar(Item):
     ladder: tuple[Rung, ...]
     closed: Interval | None
     left_out: str
+
+    @property
+    def share(self) -> str:
+        """The share of the gap that closes, in a sentence."""
+        return share_words(self.closed) if self.closed else ""
 
 
 class Refit(Item):

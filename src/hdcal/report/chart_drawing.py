@@ -1,6 +1,7 @@
 """Matplotlib's drawing of a chart: axes, SVG and PNG."""
 
 from collections.abc import Callable, Sequence
+from textwrap import wrap
 from typing import Any, Literal
 
 import numpy as np
@@ -30,6 +31,8 @@ _WIDTH = 7.6
 _MANY = 300
 # More names, or longer ones, leave an axis no room.
 _MOST_NAMES, _LONGEST_NAME, _LEVEL = 60, 26, 70
+# Names beside a bar are written in lines.
+_LINE, _LONGEST_LINES = 40, 110
 _MOST_LEGENDS, _LONGEST_LEGEND = 12, 60
 
 
@@ -165,7 +168,8 @@ def _name(axes: Axes, panel: Panel) -> None:
     at = range(1, len(panel.names) + 1, step)
     names = [plain(name, _LONGEST_NAME) for name in panel.names[::step]]
     if panel.horizontal:
-        axes.set_yticks(at, names)
+        lines = [wrap(plain(name, _LONGEST_LINES), _LINE) for name in panel.names]
+        axes.set_yticks(at, ["\n".join(each) for each in lines[::step]])
         axes.set_ylim(len(panel.names) + 0.6, 0.4)
         axes.grid(False, axis="y")
         return

@@ -41,8 +41,10 @@ def html_page(
     def figure(name: str, shows: str, caption: str) -> str:
         # As an image the drawing runs no script and shares no names with the page.
         image = _IMAGE.format(base64.b64encode(drawn[name]).decode("ascii"), shows)
-        if charts[name].failed:
-            # The image carries the mark, an interactive chart would not.
+        bars = all(panel.horizontal for panel in charts[name].panels)
+        if charts[name].failed or bars:
+            # The image carries the mark, and names beside bars: an interactive chart
+            # would not.
             return _FIGURE.format("", image, caption)
         image += _INTERACTIVE.format(Markup(chart_json(charts[name])))
         return _FIGURE.format(Markup(" data-touch"), image, caption)
