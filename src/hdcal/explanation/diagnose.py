@@ -167,13 +167,17 @@ def _which(found: Decision) -> Which:
 
 
 def _verdict(found: Decision) -> VerdictWord:
-    """Return the answer in a word."""
+    """Return the answer in a word.
+
+    No cause is named that does not fit, and no effect on the noise.
+    """
     if found.gap <= LIKELY:
         return "none"
-    leading = found.classes[0] if found.classes else found.outside
-    if not found.acting and found.outside.acts > LIKELY:
+    causes = [each for each in found.acting if each.closed is not None]
+    if not causes and found.outside.acts > LIKELY:
         return "unknown"
-    if leading.acts < NAMED:
+    leading = causes[0] if causes else None
+    if leading is None or leading.acts < NAMED or found.p_adequate < ADEQUATE:
         return "ambiguous"
     return "named" if len(leading.members) == 1 else "group"
 

@@ -242,7 +242,7 @@ def _diagnose_one(
     except Exception as error:
         return (_defect(case.name, error, alone),)
     which, closed = found.which, found.how_far.closed
-    leading = which.causes[0] if which.causes else which.outside
+    leading = next((c for c in which.causes if c.explains), which.outside)
     row = Row(
         case=case.name,
         verdict=which.verdict if found.status == "ok" else "FAILED",
