@@ -142,9 +142,7 @@ def decide_searched(
     class_of = {name: group[0] for group in groups for name in group}
     found = acting(searched, posterior, class_of, rng)
     on_noise = [
-        (name,)
-        for name in (GROWING, OUTLIERS)
-        if name in searched.predicting.effects
+        (name,) for name in (GROWING, OUTLIERS) if name in searched.predicting.effects
     ]
     causes = [_cause(members, found) for members in [*groups, *on_noise]]
     explanations = _explanations(found)

@@ -120,7 +120,9 @@ def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
     # The first coefficient is the deviation of the log stiffness from its prior mean.
     deviation = problem.log_shift + problem.log_sd * found.mean[0]
     used = 3 + sum(len(part.columns) for part in parts)
-    free = max(len(problem.y) - used, 1)
+    free = len(problem.y) - used
+    if free < 1:
+        return None
     noise_sd = float(np.sqrt(np.sum((problem.y - found.reading) ** 2) / free))
     moved = abs(deviation) > _SAME_STIFFNESS
     louder = abs(np.log(noise_sd / problem.noise_sd)) > _SAME_NOISE

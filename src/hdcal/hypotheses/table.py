@@ -36,7 +36,7 @@ class Table:
 
     def log_prior(self, key: Names) -> float:
         """Return the log prior probability of a hypothesis on the mean reading."""
-        effects = len(self.names) - 1
+        effects = max(len(self.names) - 1, 1)
         pairs = max(effects * (effects - 1) // 2, 1)
         alone = (_NONE, _SINGLE / effects, _PAIRS / pairs)
         beside = (_REMAINDER, _BESIDE / effects, _PAIRS_BESIDE / pairs)
