@@ -7,14 +7,16 @@ from threadpoolctl import threadpool_limits
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
+from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.explanation.charts import FORMULA
 from hdcal.explanation.closing import closed_on_left_out
 from hdcal.explanation.gap import Fitted, fitted, gap_by_row
 from hdcal.explanation.library import library_of
 from hdcal.explanation.next_run import rank_runs
-from hdcal.explanation.refit import Refits, failure_reasons, refit
+from hdcal.explanation.refit import Refits, failure_reasons, refit, rows_to_calibrate
 from hdcal.explanation.result import (
     ADEQUATE,
     LIKELY,
@@ -71,20 +73,20 @@ def diagnose(
         progress: called with (iterations done, iterations in all) while sampling.
 
     Raises:
-        InputError: the library is none, an effect has no prior, or the case cannot be
-            diagnosed.
+        InputError: the library is none, an effect has no prior, the seed is none, the
+            force does not grow with the deformation, or readings do not scatter.
     """
     require_case(case)
     effects = library_of(library)
-    check_effect_priors(case, {**EFFECTS, **effects})
-    require_scatter(case)
+    _check(case, effects, seed)
     rng = np.random.default_rng(seed)
     searched = search(case, effects)
     found = decide_searched(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
     names = [each.members[0] for each in found.acting if each.closed is not None]
     fit = fitted(searched, posterior, names)
-    fits = refit(case, found.hypotheses, effects, seed, progress, quick=quick)
+    calibrated = case if quick else rows_to_calibrate(case)
+    fits = refit(calibrated, found.hypotheses, effects, seed, progress, quick=quick)
     largest = float(np.max(np.abs(case.records.force)))
     size = _interval(found.gap_N)
     return Diagnosis(
@@ -117,12 +119,31 @@ def diagnose(
             rows=len(case.records.force),
             rows_diagnosed=len(searched.problem.y),
             sha256=case.data_sha256,
-            notes=case.notes,
+            notes=calibrated.notes,
         ),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
         models=dict(fits.models),
     )
+
+
+def _check(case: Case, effects: Mapping[str, type[Effect]], seed: int) -> None:
+    """Refuse a case that cannot be diagnosed.
+
+    Raises:
+        InputError: holds the reason.
+    """
+    with Findings() as wrong:
+        wrong += implausible("seed", seed)
+    check_effect_priors(case, {**EFFECTS, **effects})
+    require_scatter(case)
+    deformation = case.records.deformation - np.mean(case.records.deformation)
+    if deformation @ np.asarray(case.records.force) > 0.0:
+        return
+    units = case.units
+    words = f"the {units.load} does not grow with the {units.displacement}"
+    remedy = "check the signs of both columns and that the load cell was connected"
+    raise InputError([Finding(case.name, words, remedy)])
 
 
 def _ranked(fits: Refits) -> tuple[Refit, ...]:

@@ -9,12 +9,13 @@ least.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.case import Case
+from hdcal.evidence.fewer_rows import thin_rows
 from hdcal.hypotheses.table import OUTSIDE, Names
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
@@ -24,6 +25,8 @@ from hdcal.physics.effect import Effect
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
+# Rows from which on a model takes minutes and more to calibrate.
+_MOST_ROWS = 5_000
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,16 @@ class Refits:
     def likeliest(self) -> str | None:
         """Name of the most probable one."""
         return max(self.models, key=lambda name: self.models[name][0], default=None)
+
+
+def rows_to_calibrate(case: Case) -> Case:
+    """Return the case with at most about 5,000 single rows, the turns among them."""
+    rows = len(case.records.force)
+    if rows <= _MOST_ROWS:
+        return case
+    few = thin_rows(case, -(-rows // _MOST_ROWS), turns=True)
+    words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
+    return replace(few, notes=(*few.notes, words))
 
 
 def refit(

@@ -35,10 +35,9 @@ class _Stack(NamedTuple):
     log_weight: Float[np.ndarray, "s t"]
 
 
-def _stack(spaces: Sequence[Space], width: int = 1, points: int = 1) -> _Stack:
-    """Return spaces of at least this many columns and points of the grid."""
-    width = max([width, *(len(space.columns) for space in spaces)])
-    points = max([points, *(len(space.scale) for space in spaces)])
+def _stack(spaces: Sequence[Space]) -> _Stack:
+    width = max(len(space.columns) for space in spaces)
+    points = max(len(space.scale) for space in spaces)
 
     def padded(values, size: int, filler: float = 0.0):
         rest = [(0, size - len(values)), *[(0, 0)] * (values.ndim - 1)]
@@ -101,11 +100,16 @@ class Selection:
         white, stack = self._whitened(noise), self._stack
         gram, columns = white.space_gram, white.spaces
         if extra:
-            more = _stack(extra, columns.shape[1], stack.scale.shape[1])
+            more = _stack(extra)
             added = projection.whiten(more.columns)
-            columns = np.concatenate([columns, added])
-            gram = np.concatenate([gram, added @ np.swapaxes(added, 1, 2)])
-            stack = _Stack(*map(_joined, stack, more))
+            gram = _joined(gram, added @ np.swapaxes(added, 1, 2))
+            columns = _joined(columns, added)
+            stack = _Stack(
+                _joined(stack.owner, more.owner),
+                _joined(stack.columns, more.columns),
+                _joined(stack.scale, more.scale, filler=1.0),
+                _joined(stack.log_weight, more.log_weight, filler=-np.inf),
+            )
         return Evaluated(
             selection=self,
             none=projection.evidence_of_none(),
@@ -155,8 +159,15 @@ class Selection:
         return found._replace(log_evidence=log_evidence)
 
 
-def _joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return np.concatenate([one, other])
+def _joined(one: np.ndarray, other: np.ndarray, *, filler: float = 0.0) -> np.ndarray:
+    """Return the entries of both tables, padded to the larger size of each axis."""
+    size = np.maximum(one.shape[1:], other.shape[1:])
+
+    def padded(table: np.ndarray) -> np.ndarray:
+        rest = [(0, more) for more in size - table.shape[1:]]
+        return np.pad(table, [(0, 0), *rest], constant_values=filler)
+
+    return np.concatenate([padded(one), padded(other)])
 
 
 def _spaces(projection: Projection, columns, gram, stack: _Stack) -> Items:

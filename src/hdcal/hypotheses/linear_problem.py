@@ -18,6 +18,7 @@ from hdcal.data.gear_file.certificates import GAINS
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
+from hdcal.data.scatter import left_of_lines
 from hdcal.evidence.row_features import take_rows
 from hdcal.hypotheses.covariates import noise_correlations, tolerance_functions
 from hdcal.inference import distributions, serial_correlation
@@ -165,7 +166,7 @@ def linear_problem(
     priors = shipped | case.gear.effect_priors | own
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
     least = max(least, case.gear.force_resolution / np.sqrt(12.0))
-    noise_sd = float(about.noise_sd or max(pilot_fit(records).noise_sd, least))
+    noise_sd = float(max(about.noise_sd or _noise_sd(records, least), least))
     log_mean, log_sd = _log_stiffness(case, priors)
     base = _base(records, reading, priors, noise_sd, about.stiffness, np.exp(log_mean))
     columns = base_columns(records, reading, priors, base, log_sd)
@@ -188,6 +189,19 @@ def linear_problem(
         log_shift=log_shift,
         log_sd=log_sd,
     )
+
+
+def _noise_sd(records: Records, least: float) -> float:
+    """Return a first estimate of the noise sd [N].
+
+    The pilot fit passes through few rows exactly; then a straight line gives it.
+    """
+    found = pilot_fit(records).noise_sd
+    if found > least:
+        return found
+    left = left_of_lines(records, np.asarray(records.force))
+    lines = len(np.unique(records.run)) + len(np.unique(records.specimen))
+    return float(np.sqrt(left @ left / max(len(left) - lines, 1)))
 
 
 def _moments(priors: Mapping[str, Prior], name: str) -> tuple[float, float]:

@@ -124,7 +124,9 @@ def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
     deviation = problem.log_shift + problem.log_sd * found.mean[0]
     # Of the base model the rows at one temperature determine all but one parameter.
     used = problem.X.shape[1] - 1 + sum(len(part.columns) for part in parts)
-    free = max(len(problem.y) - used, 1)
+    free = len(problem.y) - used
+    if free < 1:
+        return None
     noise_sd = float(np.sqrt(np.sum((problem.y - found.reading) ** 2) / free))
     moved = abs(deviation) > _SAME_STIFFNESS
     louder = abs(np.log(noise_sd / problem.noise_sd)) > _SAME_NOISE

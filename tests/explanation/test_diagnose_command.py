@@ -1,0 +1,199 @@
+"""`hdcal diagnose` answers for one case or many, and writes all of it or nothing."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from commands import XB1, Hdcal
+from diagnosis_cases import rich, simulated
+from hostile_names import NAMES
+from schema_checks import obeys
+
+from hdcal.explanation import diagnose as module
+from hdcal.explanation import many_cases
+from hdcal.explanation.many_cases import REFUSED, Diagnoses
+from hdcal.explanation.result import Diagnosis
+from hdcal.report.saving import MARKER
+
+PAGE = {"report.html", "verdict.json", "where.svg", "which.svg", "how_far.svg"}
+
+
+@pytest.fixture
+def diagnose(here: Hdcal) -> Hdcal:
+    return lambda *arguments: here("diagnose", "--quick", *arguments)
+
+
+@pytest.fixture
+def cases(tmp_path: Path) -> dict[str, Path]:
+    """Cases by name: two good ones, one without scatter, one that is no table."""
+    folders = {n: tmp_path / "cases" / n for n in ("one", "two", "line", "bad")}
+    for folder in folders.values():
+        folder.mkdir(parents=True)
+        for file in ("data.csv", "gear.toml"):
+            (folder / file).write_bytes((XB1 / file).read_bytes())
+    rows = "".join(f"{0.1 * k:.1f},{20 * k}\n" for k in range(1, 9))
+    (folders["line"] / "data.csv").write_text(f"deformation_mm,force_N\n{rows}")
+    (folders["line"] / "gear.toml").write_text('[gear]\ntheory = "spring"\n')
+    (folders["bad"] / "data.csv").write_text("deformation_mm\n1\n", "utf-8")
+    return folders
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
+    asked = cases["one"], "--out", "run", "--json", "--seed", "3"
+    done = diagnose(*asked)
+    assert done.returncode == 0, done.stderr
+    assert PAGE | {MARKER} <= names(tmp_path / "run")
+    found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
+    obeys(found, Diagnosis)
+    assert json.loads(done.stdout) == found and found["seed"] == 3
+    # Only a result of this program may be replaced, and only when asked for.
+    assert diagnose(*asked).returncode == 2
+    assert diagnose(*asked, "--force", "--no-report").returncode == 0
+    assert names(tmp_path / "run") == {"verdict.json", MARKER}
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    assert diagnose(*asked, "--force").returncode == 2
+    assert (tmp_path / "run" / "notes.txt").read_text() == "mine"
+
+
+def test_the_library_can_do_without_an_effect(diagnose, cases, tmp_path: Path):
+    given = "--library", "minus:outliers,hysteresis", "--no-report"
+    assert diagnose(cases["one"], *given).returncode == 0
+    found = json.loads((tmp_path / "one-diagnosis" / "verdict.json").read_text())
+    assert not {"outliers", "hysteresis"} & {*found["library"]}
+    assert "hysteresis" not in found["which"]["effects"]
+    assert "coulomb_friction" in found["library"]
+
+
+def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path):
+    """Four are refused: by the reader, by the diagnosis, and two for their names."""
+    for name in ("one", "Refused.json"):
+        (tmp_path / name).mkdir()
+        for file in ("data.csv", "gear.toml"):
+            (tmp_path / name / file).write_bytes((XB1 / file).read_bytes())
+    given = "--no-report", "--out", "all", "--json"
+    done = diagnose(*cases.values(), "one", "Refused.json", *given)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert names(tmp_path / "all") == {"one", "two", REFUSED, MARKER}
+    found = json.loads(done.stdout)
+    obeys(found, Diagnoses)
+    assert [*found["cases"]] == ["one", "two"] and found["status"] == "ok"
+    assert {*found["refused"]} == {str(cases["bad"]), "line", "one", "Refused.json"}
+    assert "4 refused" in found["headline"]
+    written = json.loads((tmp_path / "all" / REFUSED).read_text("utf-8"))
+    obeys(written, Diagnoses)
+    assert written["refused"] == found["refused"]
+    for one in ("one", "two"):
+        alone = json.loads((tmp_path / "all" / one / "verdict.json").read_text())
+        assert alone == found["cases"][one]
+
+
+def test_bad_input_is_refused_at_once_and_nothing_is_written(
+    diagnose, cases, tmp_path: Path
+):
+    (tmp_path / "file").touch()
+    before = contents(tmp_path)
+    wrong = "--library", "minus:nothing", "--jobs", "0", "--out", "file/below"
+    done = diagnose(cases["bad"], cases["one"], "missing.csv", *wrong)
+    assert done.returncode == 2 and not done.stdout
+    for words in ("bad/data.csv", "missing.csv", "library", "jobs", "file/below"):
+        assert words in done.stderr
+    for asked in ([cases["line"]], [cases["line"], cases["bad"]]):
+        done = diagnose(*asked)
+        assert done.returncode == 2 and "last digit" in done.stderr
+    assert contents(tmp_path) == before
+
+
+def test_a_defect_in_one_case_does_not_stop_the_others(
+    diagnose, cases, monkeypatch, tmp_path: Path
+):
+    right = many_cases._write
+
+    def half(found, folder, command, *, report):
+        if found.data.name == "two":
+            (folder / "where.svg").touch()
+            raise ValueError("broken")
+        right(found, folder, command, report=report)
+
+    monkeypatch.setattr(many_cases, "_write", half)
+    done = diagnose(cases["one"], cases["two"], "--no-report", "--out", "all")
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert names(tmp_path / "all") == {"one", REFUSED, MARKER}
+    ((finding,),) = json.loads((tmp_path / "all" / REFUSED).read_text())[
+        "refused"
+    ].values()
+    assert "ValueError: broken" in finding["problem"]
+    done = diagnose(cases["two"], "--out", "alone")
+    assert done.returncode == 1 and "internal error" in done.stderr
+    assert not (tmp_path / "alone").exists()
+
+
+def test_an_interruption_leaves_nothing(diagnose, cases, monkeypatch, tmp_path: Path):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(many_cases, "_write", interrupted)
+    for asked in ([cases["one"]], [cases["one"], cases["two"]]):
+        assert diagnose(*asked).returncode == 130
+    assert names(tmp_path) == {"cases"}
+
+
+def test_with_many_cases_reports_have_to_be_asked_for(
+    diagnose, cases, monkeypatch, tmp_path: Path
+):
+    monkeypatch.setattr(sys.modules["hdcal.explanation.command"], "MANY", 1)
+    done = diagnose(cases["one"], cases["two"])
+    assert done.returncode == 0 and "--report" in done.stderr
+    assert names(tmp_path / "diagnosis" / "two") == {"verdict.json"}
+
+
+def test_any_number_of_processes_writes_the_same(diagnose, cases, tmp_path: Path):
+    for jobs in ("1", "2"):
+        given = "--jobs", jobs, "--no-report", "--out", jobs
+        assert diagnose(cases["one"], cases["two"], *given).returncode == 0
+    one, two = contents(tmp_path / "1"), contents(tmp_path / "2")
+    assert {"one/verdict.json", "two/verdict.json"} <= {*one} and one == two
+
+
+def test_a_calibration_that_failed_is_marked_in_every_file(
+    here: Hdcal, cases, monkeypatch, tmp_path: Path
+):
+    def fails(*_, **__):
+        return SimpleNamespace(usable=False, reasons=("chains disagree",))
+
+    monkeypatch.setattr("hdcal.explanation.refit.calibrate", fails)
+    done = here("diagnose", cases["one"], "--out", "alone")
+    assert done.returncode == 1 and "chains disagree" in done.stdout
+    found = json.loads((tmp_path / "alone" / "verdict.json").read_text("utf-8"))
+    obeys(found, Diagnosis)
+    assert found["status"] == "failed" and not found["refits"]
+    for file in ("report.html", "where.svg", "which.svg", "how_far.svg"):
+        assert "FAILED" in (tmp_path / "alone" / file).read_text("utf-8")
+    assert not {"posterior.nc", "bands.csv"} & names(tmp_path / "alone")
+    both = cases["one"], cases["two"], "--no-report", "--out", "all", "--json"
+    done = here("diagnose", *both)
+    assert done.returncode == 1
+    assert [r["verdict"] for r in json.loads(done.stdout)["rows"]] == ["FAILED"] * 2
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_only_text_in_the_page(name: str):
+    case = simulated(rich(), seed=1)
+    gear = replace(case.gear, name=name, material=name)
+    case = replace(case, name=name, gear=gear, notes=(name,))
+    found = module.diagnose(case, library={}, quick=True)
+    page = found.page()
+    assert "<script>alert" not in page and "<img src=x" not in page
+    assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
+    assert page.count("<title>") == page.count("</title>") == 1
