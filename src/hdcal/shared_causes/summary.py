@@ -69,7 +69,7 @@ def fleet_causes(
                 share=Interval.of(share[:, k]),
                 log_evidence_nat=float(gain[:, k].sum()),
             )
-            for k in np.argsort(-share.mean(axis=0), kind="stable")
+            for k in map(int, np.argsort(-share.mean(axis=0), kind="stable"))
         ),
         lots=_lots(case, cause != names.index(NONE)),
         not_shown=tuple(name for name in library if name not in names),
@@ -102,7 +102,7 @@ def _confounded(
     likeliest = chance.argmax(axis=1)
     return tuple(
         names[k]
-        for k in np.unique(likeliest)
+        for k in map(int, np.unique(likeliest))
         if names[k] not in (NONE, OUTSIDE)
         and np.mean(odds[likeliest == k, k]) < _SUBSTANTIAL
     )
@@ -114,7 +114,7 @@ def _credible_set(
     """Return the fewest causes with the credible probability, the likeliest first."""
     order = np.argsort(-chance, kind="stable")
     many = 1 + int(np.sum(np.cumsum(chance[order]) < _CREDIBLE))
-    found = tuple(names[k] for k in order[:many])
+    found = tuple(names[int(k)] for k in order[:many])
     add = found[0] in confounded and OUTSIDE not in found
     return (*found, OUTSIDE) if add else found
 
