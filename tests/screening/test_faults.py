@@ -293,3 +293,11 @@ def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
     x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
     found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
     assert not [one for one in found.observations if "jump" in one.kind]
+
+
+def test_two_rows_are_no_straight_part():
+    x, y = ramp()
+    x, y = x[::20], y[::20]
+    y[-2:] = 20.0 * y.max(), -20.0 * y.max()
+    found = screen(x, y)
+    assert found.straight is None or found.straight.rows.sum() >= 5

@@ -94,7 +94,7 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
         first = min(large, key=lambda i: branches[i][0])
     branch, straight = branches[first], found[first]
     part = branch[straight.rows]
-    if not np.ptp(one.x[part]):
+    if part.size < _FEWEST or not np.ptp(one.x[part]):
         return None
     slope, sd = _slope(one, part, straight.inflation)
     return _part_of(one, part, n, (slope, sd), whole=all(each.whole for each in found))
