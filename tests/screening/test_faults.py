@@ -7,7 +7,14 @@ from hdcal.screening.result import SEGMENTS
 from hdcal.screening.screen import screen
 
 RNG = np.random.default_rng(8)
+START = RNG.bit_generator.state
 STIFFNESS = 20.0
+
+
+@pytest.fixture(autouse=True)
+def same_numbers():
+    """Let the numbers of a test not depend on which tests ran before it."""
+    RNG.bit_generator.state = START
 
 
 def ramp(rows=200, back=False):
