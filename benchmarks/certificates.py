@@ -6,7 +6,7 @@ computed here, from the law of each gauge, and not by hdcal.
 """
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -22,10 +22,11 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.records import Records
 from hdcal.inference import laplace
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.sample import sample
+from hdcal.inference.structure import decide_structure
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.mixture import Mixture, pooled
 from hdcal.prediction.engine.population_force import population_force
@@ -148,12 +149,14 @@ def made(seed: int) -> Rig:
 def sampled(case: Case, seed: int) -> Posterior:
     """Return short chains of a case: what `calibrate` draws, its checks left out."""
     shipped, theory = effect_priors(), case.gear.theory
-    problem = build_problem(case, shipped)
+    form = decide_structure(case, with_gap=False)
+    problem = build_problem(case, shipped, structure=form)
     size = {"chains": 2, "warmup": 300, "draws": 500}
     draws = sample(problem, laplace.fit(problem), seed, **size)
     priors = problem_priors(case, (), shipped, theory)
     tree = xr.DataTree.from_dict({"posterior": dataset(draws.values)})
-    return Posterior(case, theory, (), priors, tree, {}, (), {"with_gap": False})
+    settings = {"with_gap": False, STRUCTURE: asdict(form)}
+    return Posterior(case, theory, (), priors, tree, {}, (), settings)
 
 
 @jax.jit

@@ -43,8 +43,11 @@ def _case(force: np.ndarray, told: Sequence[str]) -> Case:
     gear, run, row = (index.ravel() for index in np.indices(force.shape))
     table = {"specimen": names[gear], "run": run, "deformation_mm": X[row]}
     table |= {kind: GROUPS[kind](gear, run).astype(str) for kind in told}
-    case = hdcal.read_case(table | {"force_N": force.ravel()}, theory="spring")
-    return replace(case, gear=_GEAR)
+    # The priors also hold stiffnesses about which the screening would ask.
+    rising = {"force_N": _ramp(len(force)).ravel()}
+    case = hdcal.read_case(table | rising, theory="spring")
+    records = replace(case.records, force=force.ravel())
+    return replace(case, records=records, gear=_GEAR)
 
 
 def simulate(

@@ -7,7 +7,14 @@ from hdcal.screening.result import SEGMENTS
 from hdcal.screening.screen import screen
 
 RNG = np.random.default_rng(8)
+START = RNG.bit_generator.state
 STIFFNESS = 20.0
+
+
+@pytest.fixture(autouse=True)
+def same_numbers():
+    """Let the numbers of a test not depend on which tests ran before it."""
+    RNG.bit_generator.state = START
 
 
 def ramp(rows=200, back=False):
@@ -293,3 +300,11 @@ def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
     x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
     found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
     assert not [one for one in found.observations if "jump" in one.kind]
+
+
+def test_two_rows_are_no_straight_part():
+    x, y = ramp()
+    x, y = x[::20], y[::20]
+    y[-2:] = 20.0 * y.max(), -20.0 * y.max()
+    found = screen(x, y)
+    assert found.straight is None or found.straight.rows.sum() >= 5

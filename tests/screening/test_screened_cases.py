@@ -12,7 +12,14 @@ from hdcal.errors import InputError
 from hdcal.prediction.bands.bands import default_bands
 
 RNG = np.random.default_rng(4)
+START = RNG.bit_generator.state
 ROWS = 120
+
+
+@pytest.fixture(autouse=True)
+def same_numbers():
+    """Let the numbers of a test not depend on which tests ran before it."""
+    RNG.bit_generator.state = START
 
 
 def table(**columns):

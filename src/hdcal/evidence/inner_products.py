@@ -14,6 +14,9 @@ from hdcal.evidence.linear_rows import (
     remove_base,
 )
 
+# Share of the reading that is left of an exact fit, or noise of no size would follow.
+_EXACT = 1e-5
+
 
 class CommonTerms(NamedTuple):
     """What all hypotheses share, one entry per correlation.
@@ -92,6 +95,7 @@ def piece_products(
         left = project(rows, correlation, rows.reading - offsets)
         slope = project(rows, correlation, slopes)
         lengths = [np.sum(a * b, axis=1) for a, b in ((left, left), (left, slope))]
+        lengths[0] = np.maximum(lengths[0], _least_square(rows))
         loose = project(rows, correlation, flat)
         loose = loose.reshape(*deviations.shape[:2], slope.shape[1])
         both = np.stack([left, slope], axis=1)
@@ -116,8 +120,14 @@ def subspace_products(
         inside[there] = project(rows, correlation, columns[there])
         reading = np.broadcast_to(left, (count, 1, len(left)))
         spread, (be,) = _along_axes(inside, reading)
-        parts.append((np.full(count, left @ left), spread, be))
+        square = max(float(left @ left), _least_square(rows))
+        parts.append((np.full(count, square), spread, be))
     return SubspaceProducts(*map(np.stack, zip(*parts, strict=True)))
+
+
+def _least_square(rows: LinearRows) -> float:
+    """Return the squared length of the reading that an exact fit is taken to leave."""
+    return _EXACT**2 * float(np.sum(np.asarray(rows.reading) ** 2))
 
 
 def _along_axes(columns: np.ndarray, others: np.ndarray):

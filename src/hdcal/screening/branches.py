@@ -14,6 +14,7 @@ from hdcal.screening.result import (
 )
 from hdcal.screening.run import Run
 from hdcal.screening.straight_pieces import (
+    DIGITS,
     SHOWN,
     Straight,
     longest_straight,
@@ -33,8 +34,6 @@ _HOLD = 3.0
 # Movements share a straight part from this share of the longest one on; it is parallel
 # where slopes differ by no more than so many standard errors.
 _SHARED, _APART = 0.5, 3.0
-# Share of a slope that is the digits of computed readings.
-_DIGITS = 1e-9
 # A movement is large from this share of the largest force on.
 _LARGE = 0.5
 
@@ -94,7 +93,7 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
         first = min(large, key=lambda i: branches[i][0])
     branch, straight = branches[first], found[first]
     part = branch[straight.rows]
-    if not np.ptp(one.x[part]):
+    if part.size < _FEWEST or not np.ptp(one.x[part]):
         return None
     slope, sd = _slope(one, part, straight.inflation)
     return _part_of(one, part, n, (slope, sd), whole=all(each.whole for each in found))
@@ -121,7 +120,7 @@ def _parallel_part(
     slopes, sds = np.transpose(
         [_slope(one, part, wide) for part, wide in zip(parts, inflations, strict=True)]
     )
-    weight = 1.0 / np.maximum(sds, _DIGITS * np.abs(slopes)) ** 2
+    weight = 1.0 / np.maximum(sds, DIGITS * np.abs(slopes)) ** 2
     slope = float(weight @ slopes / weight.sum())
     unsure = np.maximum(_APART * sds, MACHINE_CLASS * abs(slope))
     if np.any(np.abs(slopes - slope) > unsure):

@@ -22,7 +22,7 @@ _PARAMETERS = 3.0
 # known to some points only, and a curve that bends gradually has none.
 _MARGIN = 0.1
 # Share of the readings that is no more than rounding of what was computed.
-_DIGITS = 1e-9
+DIGITS = 1e-9
 # Points from which on noise that remembers can be told from a kink: ten for each piece.
 _FEWEST_FOR_MEMORY = 10 * _PIECES
 
@@ -158,7 +158,7 @@ def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int], *, both: bool) ->
     pieces = [(a, b) for a, b in pairwise(edges) if b > a]
     left = np.concatenate([_left(x[a:b], y[a:b], both=both) for a, b in pieces])
     square = float(left @ left)
-    if square <= _DIGITS**2 * float(x @ x + y @ y):
+    if square <= DIGITS**2 * float(x @ x + y @ y):
         return 1.0
     r = float(left[1:] @ left[:-1]) / square
     # Two parameters a piece make the residuals of independent noise alternate.

@@ -1,5 +1,6 @@
 """Measurements after their screening: rows cut, zeros moved back."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -76,7 +77,8 @@ def screened(
     kept = int(result.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):
         problem = f"{kept} of {run.size} rows are left"
-        problem += f" within {wanted.words(units)}" if wanted is not None else ""
+        if wanted is not None and math.isfinite(wanted.high):
+            problem += f" within {wanted.words(units)}"
         remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
         raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
