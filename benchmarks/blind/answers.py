@@ -27,8 +27,8 @@ from benchmarks.blind.sealed_set import (
     refusal,
     write_hashed,
 )
-from hdcal.hypotheses.decision import decide
-from hdcal.hypotheses.table import OUTSIDE
+from hdcal.diagnosis.decision import decide
+from hdcal.evidence.table import OUTSIDE
 from hdcal.physics.effect import Effect
 
 Library = Mapping[str, type[Effect]]
@@ -74,31 +74,7 @@ FROZEN = TypeAdapter(Frozen)
 
 
 def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
-    """Answer as `hdcal diagnose --quick` does."""
-    verdict = hdcal.diagnose(case, library=library, quick=True)
-    which, gap, size = verdict.which, verdict.gap, verdict.which.amplitude
-    closed = verdict.shrink.closed
-    return Answer(
-        case=case.name,
-        verdict=which.verdict,
-        effect=which.effect,
-        second_effect=which.second_effect,
-        set=which.set,
-        probabilities=which.probabilities,
-        inclusion=which.inclusion,
-        detected=gap.detected,
-        # Where no gap is detected its size is not estimated.
-        gap=_quantiles(gap.rms_N) if gap.detected else None,
-        amplitude={f"{size.effect}.{size.parameter}": _quantiles(size)} if size else {},
-        closed=_quantiles(closed) if closed else None,
-        # Groups that the loading cannot separate are joined in words.
-        group=tuple(which.group.split(" / ")) if which.group else (),
-        group_members=which.group_members,
-    )
-
-
-def by_slim(case: hdcal.Case, library: Library) -> Answer:
-    """Answer as the new evidence and its one decision rule do."""
+    """Answer as `hdcal diagnose` decides."""
     found = decide(case, library)
     # That readings are coarse is a fact, and an explanation where nothing else acts.
     coarse = found.coarse_step > 0.0 and COARSE in library
@@ -143,10 +119,6 @@ def _verdict(chances: dict[str, float], group: tuple[str, ...], acts: float):
     return "group" if acts >= 0.9 else "ambiguous"
 
 
-def _quantiles(interval) -> tuple[float, float, float]:
-    return interval.median, interval.lo, interval.hi
-
-
 def by_none(case: hdcal.Case, library: Library) -> Answer:
     """Answer that there is no gap, whatever the data say: a floor for scores."""
     return _certain(case, library, {NONE: 1.0})
@@ -186,7 +158,6 @@ def _certain(case: hdcal.Case, library: Library, chances: dict[str, float]) -> A
 
 DIAGNOSERS: dict[str, Diagnoser] = {
     "hdcal": by_hdcal,
-    "slim": by_slim,
     "bic": by_bic,
     "r2": by_r2,
     "none": by_none,

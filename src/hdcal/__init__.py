@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hdcal.design.study.study import study
     from hdcal.design.wave_generator import wave_generator
     from hdcal.diagnosis.diagnose import diagnose
-    from hdcal.diagnosis.verdict import Verdict
+    from hdcal.diagnosis.result import Diagnosis
     from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.fleets.fleet import fleet
     from hdcal.fleets.fleet_posterior import FleetPosterior
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Case": "data.case",
+    "Diagnosis": "diagnosis.result",
     "DynamicPosterior": "motion.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
@@ -55,7 +56,6 @@ _HOMES = {
     "Records": "data.records",
     "Rows": "physics.effect",
     "Tracker": "tracking.tracker",
-    "Verdict": "diagnosis.verdict",
     "calibrate": "calibration.calibrate",
     "calibrate_dynamic": "motion.dynamic_calibration",
     "causes": "shared_causes.causes",

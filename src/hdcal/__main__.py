@@ -24,8 +24,8 @@ from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command import design
 from hdcal.design.study.command import study
+from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
-from hdcal.explanation.command import diagnose
 from hdcal.fleets.command import fleet
 from hdcal.fleets.force.command import margin
 from hdcal.motion.respond.command import respond

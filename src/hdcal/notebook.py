@@ -20,7 +20,6 @@ TELLERS = {
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
     "Response": "motion.respond.summary.response_report",
-    "Verdict": "diagnosis.summary.verdict_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
@@ -31,7 +30,6 @@ TABLES = {
     "NextForce": "fleets.force.chart.bound_rows",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
-    "Verdict": "diagnosis.chart.hypothesis_columns",
 }
 # -> its chart.
 CHARTS = {
@@ -39,7 +37,6 @@ CHARTS = {
     "Fleet": "fleets.chart.fleet_chart",
     "NextForce": "fleets.force.chart.force_chart",
     "Response": "motion.respond.chart.response_chart",
-    "Verdict": "diagnosis.chart.verdict_chart",
 }
 # -> what draws it where no chart holds it.
 DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.blind import __main__ as program
-from benchmarks.blind.answers import answer_set, by_bic, by_none, by_r2, by_slim
+from benchmarks.blind.answers import answer_set, by_bic, by_hdcal, by_none, by_r2
 from benchmarks.blind.rivals import closable_share, fit_each
 from commands import XB1
 from diagnosis_cases import NOISE, rich, simulated
@@ -117,7 +117,7 @@ def test_rivals_on_noise_alone():
 
 def test_new_evidence_answers():
     size = {"hysteresis": {"force": 4.0, "reach": 0.1}}
-    plain, loop = (by_slim(simulated(rich(), e, seed=1), EFFECTS) for e in ({}, size))
+    plain, loop = (by_hdcal(simulated(rich(), e, seed=1), EFFECTS) for e in ({}, size))
     assert plain.verdict == "none" and not plain.detected and plain.set == ("none",)
     assert loop.effect == "hysteresis" and loop.inclusion["hysteresis"] > 0.9
     assert loop.set == ("hysteresis",) and loop.closed is not None

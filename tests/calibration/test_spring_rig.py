@@ -10,7 +10,7 @@ from schema_checks import obeys
 from short import options
 
 from hdcal.calibration.calibration import Calibration
-from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.result import Diagnosis
 
 DAMPER = ROOT / "datasets" / "slit-damper"
 
@@ -50,9 +50,7 @@ def test_every_question_that_needs_no_sizes_is_answered(here: Hdcal, calibrated:
 def test_a_damper_that_yields_is_a_loop(here: Hdcal):
     done = here("diagnose", DAMPER, "--quick", "--json")
     found = json.loads(done.stdout)
-    obeys(found, VerdictAnswer)
-    assert found["budget"] is None
-    assert found["which"]["group"] == "loop"
-    assert found["which"]["effect"] == "hysteresis"
-    told = " ".join(found["answer"])
+    obeys(found, Diagnosis)
+    assert "hysteresis" in found["which"]["causes"][0]["members"]
+    told = " ".join(each["statement"] for each in found["seen"])
     assert "lower while the deformation decreases" in told

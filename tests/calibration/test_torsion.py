@@ -13,8 +13,7 @@ import hdcal
 from hdcal.calibration.calibration import Calibration, calibration_of
 from hdcal.calibration.check.check import check
 from hdcal.cli.option_types import read_quantity, unit_findings
-from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.summary import verdict_report
+from hdcal.diagnosis.result import Diagnosis
 from hdcal.errors import InputError
 from hdcal.fleets.answer import FleetAnswer
 from hdcal.fleets.read_fleet import read_fleet
@@ -158,23 +157,19 @@ def test_a_saved_posterior_knows_its_quantities(posterior, tmp_path):
 
 
 def test_the_diagnosis_is_of_torques(case):
-    verdict = hdcal.diagnose(case, quick=True)
-    assert "coulomb_friction" in verdict.which.set
-    report = verdict_report(verdict)
-    told = json.loads(as_json(report.answer))
+    found = hdcal.diagnose(case, quick=True)
+    assert "coulomb_friction" in found.which.causes[0].members
+    told = found.to_dict()
     assert not _in_newtons(_keys(told))
     assert told["gap"]["rms_N_m"]["median"] == pytest.approx(0.4, rel=0.2)
-    assert {"direction", "angle"} & {
-        cell["covariate"] for cell in told["where"]["cells"]
-    }
     assert not {"N", "mm"} & _units(told)
-    Draft202012Validator(json_schema(VerdictAnswer, TORQUE)).validate(told)
-    words = " ".join([told["headline"], *told["answer"], *told["limits"]])
+    Draft202012Validator(Diagnosis.json_schema(TORQUE)).validate(told)
+    words = found.page()
     assert "torque" in words
     assert " force " not in words.replace("force saturation", "")
     assert " N " not in words
-    charts = report.charts()["where"]
-    assert charts[0].x == "angle [rad]"
+    charts = found.charts()["where"].panels
+    assert charts[0].x == "angle as read [rad]"
     assert charts[0].y == "measured − model [N·m]"
 
 

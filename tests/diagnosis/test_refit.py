@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rigs import cycles, make_case
 
-from hdcal.diagnosis.refit import weighed
+from hdcal.diagnosis.refit import rows_to_calibrate, weighed
 
 
 def calibrated(failing=(), widths=None):
@@ -22,7 +23,7 @@ def calibrated(failing=(), widths=None):
 
 
 def shares(found) -> dict[str, float]:
-    return {name: share for name, (share, _) in found.models.items()}
+    return {name: share for name, (share, _) in found.posteriors.items()}
 
 
 def test_every_hypothesis_of_five_per_cent_is_kept_whatever_the_verdict():
@@ -95,7 +96,7 @@ def test_what_fails_its_checks_is_left_out_not_shared_out():
     assert shares(found) == pytest.approx({"b": 0.7, "unknown": 0.3})
     run, _ = calibrated(failing=("a", "b", "unknown"))
     nothing = weighed({"a": 0.3, "b": 0.7, "unknown": 0.0, "none": 0.0}, run)
-    assert not nothing.models and nothing.left_out is None
+    assert not nothing.posteriors and nothing.left_out is None
 
 
 def test_of_many_small_ones_the_likeliest_is_kept():
@@ -104,3 +105,14 @@ def test_of_many_small_ones_the_likeliest_is_kept():
     found = weighed(chances, run)
     assert sorted(asked) == sorted(["none", "unknown"])
     assert shares(found) == pytest.approx({"none": 0.04, "unknown": 0.96})
+
+
+def test_of_a_long_log_some_single_rows_are_calibrated_on_and_the_turns_kept():
+    long = make_case(cycles(12_000))
+    few = rows_to_calibrate(long)
+    assert 3_000 <= len(few.records.force) <= 5_100
+    assert set(np.asarray(few.records.force)) <= set(np.asarray(long.records.force))
+    assert np.max(few.records.deformation) == np.max(long.records.deformation)
+    assert len(few.notes) == len(long.notes) + 1
+    short = make_case(cycles(102))
+    assert rows_to_calibrate(short) is short

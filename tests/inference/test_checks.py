@@ -14,7 +14,7 @@ from hdcal.inference.checks import (
     rounding_check,
     sampling_checks,
 )
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
 from hdcal.inference.identifiability import linearise, unidentified
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import Draws
@@ -273,7 +273,7 @@ def test_power_scaling_overrules_a_middling_contraction():
     of_prior, none = -50.0 * draws**2, 1e-3 * rng.normal(size=draws.shape)
     weak = diagnose_parameters({"x": draws}, prior, of_prior, none)["x"]
     strong = diagnose_parameters({"x": draws}, prior, none, of_prior)["x"]
-    assert isinstance(weak, Diagnosis)
+    assert isinstance(weak, Convergence)
     assert (weak.driven_by, strong.driven_by) == ("prior", "data")
 
 

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -12,9 +11,8 @@ import pytest
 from commands import Hdcal
 from posteriors import batch, beside, single, stiffer
 from schema_checks import obeys
-from verdicts import ambiguous, failed
 
-from hdcal.diagnosis.summary import write_verdict
+from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.report.answer import json_schema
 
@@ -39,9 +37,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     models |= {second: (0.4, beside(stiffer(gears, 1.05), second))}
     for name, kept in (("ambiguous", 2), ("named", 1)):
         chosen = dict(list(models.items())[:kept])
-        verdict = replace(ambiguous(), posteriors=chosen)
-        write_verdict(verdict, place / name, report=False)
-    write_verdict(failed(), place / "failed", report=False)
+        ModelAverage(chosen, None).save(place / name / "posterior.nc")
+    failed = {"schema": "hdcal.verdict/3", "status": "failed", "reasons": ["why"]}
+    (place / "failed" / "verdict.json").write_text(json.dumps(failed), "utf-8")
     return place
 
 

@@ -1,39 +1,37 @@
 """Both reports can be read in a real browser: on a screen, a phone and paper."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 from commands import Done
+from diagnosis_cases import judged, rich, simulated
 from slices import slice_of
-from verdicts import KINDS, named
 
-from hdcal.diagnosis.summary import write_verdict
-from hdcal.inference.posterior import Posterior
+from hdcal.report.result_folder import page_files
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}
 Calibrated = tuple[Done, Path]
-REPORTS = ["calibration", "diagnosis", "quick", "ambiguous", "failed"]
+REPORTS = ["calibration", "diagnosis", "none", "failed"]
 
 
 @pytest.fixture(scope="module")
 def reports(calibrated: Calibrated, tmp_path_factory) -> dict[str, Path]:
     """Every kind of report, on disk."""
-    folder = tmp_path_factory.mktemp("reports")
-    posterior = Posterior.load(calibrated[1])
-    verdicts = {
-        "diagnosis": replace(named(), posteriors={"hysteresis": (0.94, posterior)}),
-        "quick": KINDS["none"](),
-        "ambiguous": KINDS["ambiguous"](),
-        "failed": KINDS["failed"](),
+    loop = judged(simulated(rich(), {"hysteresis": {"force": 4.0, "reach": 0.1}}))
+    results = {
+        "diagnosis": loop,
+        "none": judged(simulated(rich())),
+        "failed": loop.model_copy(update={"reasons": ("the sampler diverged",)}),
     }
-    for name, verdict in verdicts.items():
-        (folder / name).mkdir()
-        write_verdict(verdict, folder / name, command=f"hdcal diagnose {name}")
-    pages = {name: folder / name / "report.html" for name in verdicts}
-    return {"calibration": calibrated[1] / "report.html", **pages}
+    pages = {"calibration": calibrated[1] / "report.html"}
+    for name, result in results.items():
+        folder = tmp_path_factory.mktemp(name)
+        for file, content in page_files(result, f"hdcal diagnose {name}").items():
+            (folder / file).write_bytes(content)
+        pages[name] = folder / "report.html"
+    return pages
 
 
 @pytest.fixture(scope="module", params=slice_of(REPORTS, ["calibration", "failed"]))
@@ -106,9 +104,9 @@ STYLE = '<style>body { min-width: 3000px }</style><p style="width: 3000px">x</p>
 def test_the_policy_lets_nothing_planted_act(reports, tmp_path: Path):
     """And what the page brings along looks as it does without one."""
     words = SCRIPT + IMAGE + STYLE + '<iframe src="data:text/html,x"></iframe>'
-    kept = planted(reports["quick"], tmp_path, words, policy=True)
-    free = planted(reports["quick"], tmp_path, words)
-    plain = look(reports["quick"], tmp_path)
+    kept = planted(reports["none"], tmp_path, words, policy=True)
+    free = planted(reports["none"], tmp_path, words)
+    plain = look(reports["none"], tmp_path)
     assert any("example.invalid" in request for request in free.requests)
     assert not kept.requests
     assert {"script-src", "img-src", "style-src"} <= {
@@ -130,26 +128,26 @@ def _directives(line: str) -> list[str]:
 
 @pytest.mark.thorough
 def test_the_page_looks_the_same_without_its_policy(reports, tmp_path: Path):
-    seen = look(reports["quick"], tmp_path)
-    assert planted(reports["quick"], tmp_path, "").frames == seen.frames
+    seen = look(reports["none"], tmp_path)
+    assert planted(reports["none"], tmp_path, "").frames == seen.frames
 
 
 @pytest.mark.parametrize("scheme", ["http", "https"])
 def test_a_planted_request_is_caught(reports, tmp_path: Path, scheme: str):
     words = f'<img src="{scheme}://example.invalid/x.png" alt="">'
-    seen = planted(reports["quick"], tmp_path, words)
+    seen = planted(reports["none"], tmp_path, words)
     assert any("example.invalid" in request for request in seen.requests)
     assert any(image["natural"] == 0 for image in seen.frames["desk"]["images"])
 
 
 def test_a_planted_error_is_caught(reports, tmp_path: Path):
-    seen = planted(reports["quick"], tmp_path, "<script>undefined.planted</script>")
+    seen = planted(reports["none"], tmp_path, "<script>undefined.planted</script>")
     assert any("planted" in line for line in seen.complaints)
 
 
 def test_a_planted_overflow_is_caught(reports, tmp_path: Path):
     words = '<p style="width: 1000px">planted</p>'
-    seen = planted(reports["quick"], tmp_path, words)
+    seen = planted(reports["none"], tmp_path, words)
     assert seen.frames["phone"]["width"] > PHONE
     assert seen.frames["paper"]["width"] > PAPER
     assert any("planted" in node for node in seen.frames["phone"]["past"])
@@ -159,7 +157,7 @@ def test_a_planted_overflow_is_caught(reports, tmp_path: Path):
 def test_a_planted_wide_table_is_caught_on_paper_only(reports, tmp_path: Path):
     # On a phone such a table scrolls by itself; paper cannot.
     words = '<div class="wide"><table><td style="min-width: 900px">x</td></table></div>'
-    seen = planted(reports["quick"], tmp_path, words)
+    seen = planted(reports["none"], tmp_path, words)
     assert not seen.frames["phone"]["past"]
     assert seen.frames["phone"]["width"] <= PHONE
     assert seen.frames["paper"]["past"]

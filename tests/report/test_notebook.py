@@ -6,22 +6,21 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 import xarray as xr
+from diagnosis_cases import judged, rich, simulated
 from fleets import handmade
 from matplotlib.figure import Figure
 from moving import still_posterior
 from posteriors import single
-from verdicts import named
 
 import hdcal
 from hdcal.data.resources import datasets_folder
-from hdcal.diagnosis.summary import verdict_answer
 from hdcal.errors import InputError
 from hdcal.inference.residual_shapes import Structure
 from hdcal.notebook import RESULTS, TELLERS, Shown
 from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = sorted({*TELLERS, *RESULTS, "Case"} - {"DynamicPosterior"})
+NAMES = sorted({*TELLERS, *RESULTS, "Case", "Diagnosis"} - {"DynamicPosterior"})
 
 
 def test_every_public_result_is_shown():
@@ -50,7 +49,10 @@ def results():
             hdcal.respond(still_posterior(), "step", points=21, draws=20),
             "The deformation reaches",
         ),
-        "Verdict": (named(), "Most likely cause"),
+        "Diagnosis": (
+            judged(simulated(rich(), {"hysteresis": {"force": 4.0, "reach": 0.1}})),
+            "Hysteresis",
+        ),
     }
 
 
@@ -60,14 +62,6 @@ def test_a_result_is_shown(name: str, results):
     assert type(found).__name__ == name
     shown = found._repr_html_()
     assert words in shown and "<html" not in shown and "<script" not in shown
-
-
-def test_a_quick_verdict_says_that_nothing_was_sampled(results):
-    quick = replace(results["Verdict"][0], quick=True, seed=3)
-    words = "quick: no margins were sampled"
-    assert words in quick._repr_html_()
-    assert words not in results["Verdict"][0]._repr_html_()
-    assert (verdict_answer(quick).seed, verdict_answer(quick).quick) == (3, True)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -88,13 +82,12 @@ def test_a_result_is_a_line_a_table_and_a_drawing(name: str, results):
 
 
 def test_tables_hold_what_the_results_say(results):
-    margin, verdict = results["Margin"][0], results["Verdict"][0]
+    margin, verdict = results["Margin"][0], results["Diagnosis"][0]
     (level,) = margin.to_frame().itertuples()
     assert level.upper_bound_N == margin.worst.upper_bound_N
     assert level.force_N_median == margin.worst.force_N.median
-    frame = verdict.to_frame().set_index("hypothesis")
-    assert frame.probability.to_dict() == verdict.which.probabilities
-    assert frame.probability.is_monotonic_decreasing
+    probabilities = [cause.probability for cause in verdict.effects]
+    assert [*verdict.to_frame().probability] == probabilities
     bands, posterior = results["Bands"][0], results["Posterior"][0]
     np.testing.assert_array_equal(bands.to_frame().tested, bands.tested)
     parameters = posterior.to_frame().set_index("name")
@@ -119,8 +112,9 @@ def test_pyplot_is_asked_where_no_axes_are_given(results):
 
 
 def test_a_failed_result_says_so_in_its_line(results):
-    failed = replace(results["Verdict"][0], reasons=("the sampler diverged",))
-    assert repr(failed) == "<Verdict: FAILED, do not use>"
+    reasons = ("the sampler diverged",)
+    failed = results["Diagnosis"][0].model_copy(update={"reasons": reasons})
+    assert repr(failed) == "<Diagnosis: FAILED, do not use>"
 
 
 def test_a_case_says_what_was_guessed_of_it(results):
@@ -143,13 +137,13 @@ def test_residuals_say_their_shapes(results):
 
 def test_a_verdict_stands_for_its_models(results):
     held = {"none": (1.0, results["Posterior"][0])}
-    verdict = replace(results["Verdict"][0], posteriors=held)
+    verdict = results["Diagnosis"][0].model_copy(update={"posteriors": held})
     pairs = list(held.values())
     found = hdcal.predict(verdict, [0.2, 0.4]).to_frame()
     listed = hdcal.predict(pairs, [0.2, 0.4]).to_frame()
     assert found.equals(listed)
-    with pytest.raises(InputError, match="a quick verdict holds none"):
-        hdcal.margin(replace(verdict, posteriors={}), 0.4)
+    with pytest.raises(InputError, match="a quick diagnosis holds none"):
+        hdcal.margin(results["Diagnosis"][0], 0.4)
 
 
 def test_what_is_no_case_or_model_is_told_so(results):

@@ -10,8 +10,8 @@ from commands import Hdcal
 from schema_checks import obeys
 
 import hdcal
-from hdcal.hypotheses.noise_models import PRIOR_ODDS
-from hdcal.hypotheses.search import search
+from hdcal.evidence.noise_models import PRIOR_ODDS
+from hdcal.evidence.search import search
 from hdcal.physics.registry import EFFECTS
 from hdcal.shared_causes.gear_evidence import by_cause, gears_of, weigh_gear
 from hdcal.shared_causes.result import FleetCauses

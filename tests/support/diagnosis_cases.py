@@ -9,7 +9,7 @@ from rigs import make_case, make_gear, make_records
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.diagnosis.diagnose import diagnose
-from hdcal.diagnosis.verdict import Verdict
+from hdcal.diagnosis.result import Diagnosis
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
@@ -62,6 +62,6 @@ def simulated(
     return make_case(replace(records, force=force), make_gear(**gear))
 
 
-def judged(case: Case, **settings) -> Verdict:
-    """Return the quick verdict."""
+def judged(case: Case, **settings) -> Diagnosis:
+    """Return the quick diagnosis."""
     return diagnose(case, quick=True, **settings)

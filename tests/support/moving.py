@@ -11,7 +11,7 @@ from structures import form_of
 from hdcal import EFFECTS, Posterior
 from hdcal.data.priors import dynamic_priors, effect_priors
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.diagnostics import Convergence
 from hdcal.inference.posterior import STRUCTURE
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import problem_priors, unit_stiffness
@@ -127,7 +127,7 @@ def still_posterior(
         draws |= {name: np.ones(shape) for name in ("gap_sd", "gap_length")}
     groups = {"posterior": dataset(draws), **data_groups(records)}
     tree = xr.DataTree.from_dict(groups)
-    driven = Diagnosis(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
+    driven = Convergence(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
     check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
     settings = {
         "with_gap": gap is not None,

@@ -11,7 +11,7 @@ from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.diagnostics import Convergence
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import build_problem, problem_priors
@@ -51,7 +51,7 @@ def written_posterior(
         }
     )
     diagnoses = {
-        name: Diagnosis(
+        name: Convergence(
             rhat=1.0,
             ess_bulk=1000.0,
             ess_tail=1000.0,

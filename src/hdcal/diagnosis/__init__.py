@@ -1,1 +1,1 @@
-"""Where is the sim-to-real gap, which effect causes it, how far does it shrink."""
+"""Diagnosis: where model and readings part, which effect causes it, and how far."""

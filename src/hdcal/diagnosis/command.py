@@ -50,8 +50,13 @@ def diagnose(console: Console, cases, out, force, **settings):
     """
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
-    from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
-    from hdcal.diagnosis.overview import document_and_answer, write_refused
+    from hdcal.diagnosis.many_cases import (
+        REFUSED,
+        diagnose_all,
+        overview,
+        read_cases,
+        tell_notes,
+    )
     from hdcal.physics.registry import EFFECTS
 
     with console.wrong as wrong:
@@ -76,9 +81,11 @@ def diagnose(console: Console, cases, out, force, **settings):
         if not settings["report"]:
             console.words(f"more than {MANY} cases: no reports without --report")
     with console.folder.filled() as folder:
-        made = diagnose_all(asked, folder, command=console.command, **settings)
+        found, left = diagnose_all(asked, folder, command=console.command, **settings)
+        together = overview(found, left.refused)
         if asked.many:
-            write_refused(made[1].refused, folder)
-    page = "report.html" if settings["report"] else "verdict.json"
-    code = console.answer(*document_and_answer(*made), out, "" if asked.many else page)
-    return 2 if made[1].refused else code
+            (folder / REFUSED).write_text(together.to_json(), "utf-8")
+    (one, *_) = found.values()
+    shown = together if one.shown is None else one.shown
+    code = console.show_written(shown)
+    return 2 if left.refused else code

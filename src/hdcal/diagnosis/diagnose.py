@@ -1,7 +1,6 @@
-"""Diagnose a case: where, which, how far, and what to test next."""
+"""Diagnose a case: where model and readings part, which effect causes it, how far."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -10,35 +9,48 @@ from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
-from hdcal.diagnosis.closure import closure
-from hdcal.diagnosis.detection import Detection, detect_gap
+from hdcal.data.theory_names import SPRING
+from hdcal.diagnosis.charts import FORMULA
+from hdcal.diagnosis.closing import closed_on_left_out
+from hdcal.diagnosis.decision import (
+    TEMPERATURE,
+    CauseClass,
+    Decision,
+    decide_searched,
+)
+from hdcal.diagnosis.decision import Interval as Found
+from hdcal.diagnosis.gap import Fitted, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
-from hdcal.diagnosis.refit import (
-    MOST_LEFT_OUT,
-    Refits,
-    failure_reasons,
-    refit,
-    with_sampled_size,
+from hdcal.diagnosis.refit import Refits, failure_reasons, refit, rows_to_calibrate
+from hdcal.diagnosis.result import (
+    ADEQUATE,
+    LIKELY,
+    NAMED,
+    Cause,
+    Data,
+    Diagnosis,
+    Explanation,
+    Gap,
+    HowFar,
+    Refit,
+    Rung,
+    VerdictWord,
+    Which,
 )
 from hdcal.diagnosis.seen import what_is_seen
-from hdcal.diagnosis.stiffness_factors import stiffness_budget
-from hdcal.diagnosis.verdict import Closure, Verdict, Which
-from hdcal.diagnosis.weighing import weigh
-from hdcal.diagnosis.which import identify_cause
+from hdcal.diagnosis.wording import effect_words
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.evidence.case_evidence import CaseEvidence
-from hdcal.evidence.fewer_rows import thin_rows
+from hdcal.evidence.noise_models import OUTLIERS
+from hdcal.evidence.search import Searched, search
+from hdcal.evidence.table import OUTSIDE
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
+from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.pooled import pool
-from hdcal.report.words import hypothesis, percent
-
-# Rows from which on a model with a memory takes minutes and more to calibrate.
-_MOST_FITTED = 5_000
-_NO_GAP = "no gap is detected, so that there is nothing to close"
-_NO_CAUSE = "that nothing is missing remains the most probable hypothesis"
+from hdcal.report.item import Interval
+from hdcal.versions import versions
 
 
 # Thousands of small systems are solved, over which threads only wait for each other.
@@ -50,77 +62,81 @@ def diagnose(
     quick: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
-) -> Verdict:
-    """Say where model and data part, which effect causes it and how far it closes.
+) -> Diagnosis:
+    """Say where model and readings part, which effect causes it and how far it closes.
 
     Args:
         case: from `read_case`.
         library: effects to consider, by name; by default all of them.
-        quick: without calibrating the corrected model by NUTS.
+        quick: without calibrating the models that are left.
         seed: of all random numbers.
         progress: called with (iterations done, iterations in all) while sampling.
 
     Raises:
-        InputError: an effect, a prior or the data cannot be used, see `_check`.
+        InputError: the library is none, an effect has no prior, the seed is none, the
+            force does not grow with the deformation, or readings do not scatter.
     """
     require_case(case)
-    library = library_of(library)
-    _check(case, library, seed)
-    require_scatter(case)
+    effects = library_of(library)
+    _check(case, effects, seed)
     rng = np.random.default_rng(seed)
-    # Draws of its own: what follows does not depend on how many there were.
-    weighed = weigh(case, library, rng.spawn(1)[0])
-    diagnosed, library = weighed.case, weighed.library
-    evidence, posterior = weighed.evidence, weighed.posterior
-    found = detect_gap(evidence, posterior, diagnosed, rng)
-    which = identify_cause(evidence, found, diagnosed, library, rng)
-    closed = _closure(evidence, which, found, rng)
-    fitted = _fitted(case, weighed.averaged_rows * weighed.row_step)
-    fits = refit(fitted, posterior, library, seed, progress, quick=quick)
-    runs, no_run = rank_runs(evidence, posterior, library, rng)
-    return Verdict(
-        case=case,
-        gap=found.gap(case, closed.ladder[-1].rms_N if closed.ladder else None),
-        where=found.where,
-        which=with_sampled_size(which, fits),
-        shrink=closed,
-        next_test=tuple(replace(run, run=case.units.say(run.run)) for run in runs),
-        budget=stiffness_budget(evidence, case, which.named, _stiffness(fits)),
-        posteriors=dict(fits.models),
-        left_out=fits.left_out,
-        library=tuple(library),
-        notes=(
-            *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
-            *[note for note in fitted.notes if note not in case.notes and not quick],
+    searched = search(case, effects)
+    found = decide_searched(searched, seed=seed)
+    posterior = searched.table.posterior(TEMPERATURE)
+    names = [each.members[0] for each in found.acting if each.closed is not None]
+    fit = fitted(searched, posterior, names)
+    calibrated = case if quick else rows_to_calibrate(case)
+    fits = refit(calibrated, found.hypotheses, effects, seed, progress, quick=quick)
+    largest = float(np.max(np.abs(case.records.force)))
+    size = _interval(found.gap_N)
+    return Diagnosis(
+        part="part" if case.gear.theory == SPRING else "gear",
+        units=case.units,
+        gap=Gap(
+            probability=found.gap,
+            rms_N=size,
+            noise_sd_N=fit.noise_sd,
+            share_of_full_scale=size.median / largest if size else None,
+            correlation=fit.noise.correlation,
         ),
+        seen=what_is_seen(searched.problem, case),
+        which=_which(found),
+        how_far=_how_far(case, searched, fit, names, rng),
+        next_test=tuple(
+            run.model_copy(update={"run": case.units.say(run.run)})
+            for run in rank_runs(searched, posterior, rng)
+        ),
+        refits=_ranked(fits),
+        left_out=fits.left_out,
+        stiffness_N_per_mm=_stiffness(fits),
         reasons=failure_reasons(fits),
-        averaged_rows=weighed.averaged_rows,
-        row_step=weighed.row_step,
-        no_run=no_run,
-        seen=what_is_seen(evidence, diagnosed),
+        coarse_step_N=found.coarse_step,
+        library=tuple(effects),
         seed=seed,
-        quick=quick,
+        versions=versions(),
+        data=Data(
+            name=case.name,
+            rows=len(case.records.force),
+            rows_diagnosed=len(searched.problem.y),
+            sha256=case.data_sha256,
+            notes=calibrated.notes,
+        ),
+        case=case,
+        rows=gap_by_row(searched, posterior, rng),
+        posteriors=dict(fits.posteriors),
     )
 
 
-def _stiffness(fits: Refits) -> np.ndarray | None:
-    """Return draws of the stiffness as read over all models [N/mm]."""
-    if not fits.models:
-        return None
-    return pool([*fits.models.values()]).values["stiffness"]
-
-
-def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
-    """Refuse priors of unknown effects, and forces that fall with the deformation.
+def _check(case: Case, effects: Mapping[str, type[Effect]], seed: int) -> None:
+    """Refuse a case that cannot be diagnosed.
 
     Raises:
-        InputError: an effect has no prior, the gear file
-            names an unknown one, or the force does not grow with the deformation; or
-            the seed is none.
+        InputError: holds the reason.
     """
     with Findings() as wrong:
         wrong += implausible("seed", seed)
-    check_effect_priors(case, {**EFFECTS, **library})
+    check_effect_priors(case, {**EFFECTS, **effects})
+    require_scatter(case)
     deformation = case.records.deformation - np.mean(case.records.deformation)
     if deformation @ np.asarray(case.records.force) > 0.0:
         return
@@ -130,61 +146,98 @@ def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     raise InputError([Finding(case.name, words, remedy)])
 
 
-def _closure(
-    evidence: CaseEvidence, which: Which, found: Detection, rng: np.random.Generator
-) -> Closure:
-    """Return how far the named effects close the gap, or why there is none to close."""
-    if found.basis is None or which.verdict == "none":
-        reason = _NO_GAP if found.basis is None else _NO_CAUSE
-        return Closure((), None, "", None, None, None, reason)
-    effects = {*evidence.single.names, *evidence.subspace_effects}
-    members = [name for name in which.set if name in effects]
-    return closure(evidence, which.named, members, found.basis, found.correlation, rng)
+def _ranked(fits: Refits) -> tuple[Refit, ...]:
+    ranked = sorted(fits.posteriors.items(), key=lambda item: -item[1][0])
+    return tuple(Refit(hypothesis=n, probability=share) for n, (share, _) in ranked)
 
 
-def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[str]:
-    notes = [
-        f"{name} is accounted for by the gear file's force_resolution_N"
-        for name in evidence.accounted
-    ]
-    notes += [
-        f"the calibration with {name} failed its checks and is left out of the bands"
-        for name in fits.failed
-    ]
-    left = fits.left_out
-    if left is not None and left.probability >= 0.5 * MOST_LEFT_OUT:
-        notes.append(
-            f"{percent(left.probability)} of the probability lies on hypotheses that "
-            f"were not calibrated; in the bands it counts as "
-            f"{hypothesis(left.counted_as)}"
-        )
-    if group > 1:
-        notes.append(
-            f"means of {group} neighbouring rows were diagnosed, not single rows"
-        )
-    if step > 1:
-        notes.append(
-            f"of every {step} {'rows' if group == 1 else 'means'} one was diagnosed: "
-            "neighbours err so much alike that those between say little more"
-        )
-    if group > 1 or step > 1:
-        notes.append("the noise of single rows was not looked at")
-    return notes
+def _stiffness(fits: Refits) -> Interval | None:
+    """Return the stiffness as read over all models [N/mm]."""
+    if not fits.posteriors:
+        return None
+    return Interval.of(pool([*fits.posteriors.values()]).values["stiffness"])
 
 
-def _fitted(case: Case, step: int) -> Case:
-    """Return the rows that the corrected model is calibrated on.
+def _interval(found: Found | None) -> Interval | None:
+    return found and Interval(median=found.median, lo=found.low, hi=found.high)
 
-    Single ones, as it speaks of the noise of a reading, and as far apart as those that
-    were diagnosed: those between err like them.
 
-    Args:
-        case: all rows.
-        step: one of so many rows was diagnosed, or went into a mean.
+def _which(found: Decision) -> Which:
+    def cause(each: CauseClass) -> Cause:
+        members = tuple(name for name in each.members if name != OUTSIDE)
+        closed = _interval(each.closed)
+        return Cause(members=members, probability=each.acts, explains=closed)
+
+    return Which(
+        verdict=_verdict(found),
+        causes=tuple(map(cause, found.classes)),
+        outside=cause(found.outside),
+        set=tuple(
+            Explanation(
+                effects=tuple(name for name in each.names if name != OUTSIDE),
+                outside=OUTSIDE in each.names,
+                probability=each.probability,
+            )
+            for each in found.credible
+        ),
+        effects=dict(found.effects),
+        fits=found.p_adequate >= ADEQUATE,
+        p_value=found.p_adequate,
+        not_testable={n: tuple(columns) for n, columns in found.lacking.items()},
+    )
+
+
+def _verdict(found: Decision) -> VerdictWord:
+    """Return the answer in a word.
+
+    No cause is named that does not fit, and no effect on the noise.
     """
-    rows = len(case.records.force)
-    if rows <= _MOST_FITTED:
-        return case
-    few = thin_rows(case, max(step, -(-rows // _MOST_FITTED)), turns=True)
-    words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
-    return replace(few, notes=(*few.notes, words))
+    if found.gap <= LIKELY:
+        return "none"
+    causes = [each for each in found.acting if each.closed is not None]
+    if not causes and found.outside.acts > LIKELY:
+        return "unknown"
+    leading = causes[0] if causes else None
+    if leading is None or leading.acts < NAMED or found.p_adequate < ADEQUATE:
+        return "ambiguous"
+    return "named" if len(leading.members) == 1 else "group"
+
+
+def _how_far(
+    case: Case,
+    searched: Searched,
+    fit: Fitted,
+    names: Sequence[str],
+    rng: np.random.Generator,
+) -> HowFar:
+    closed, word = None, ""
+    if names:
+        closed, word = closed_on_left_out(searched, fit.noise, fit.noise_sd, names, rng)
+    ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
+    ladder += [
+        Rung(model=_model(name), rms_N=size)
+        for name, size in fit.rms.items()
+        if name != OUTSIDE or len(fit.rms) > 1
+    ]
+    wild = fit.noise.name == OUTLIERS
+    noise = "noise without wild readings" if wild else "noise"
+    ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
+    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
+
+
+def _model(added: str) -> str:
+    if not added:
+        return "calibrated straight model"
+    return f"+ {'outside the library' if added == OUTSIDE else effect_words(added)}"
+
+
+def _formula(case: Case, searched: Searched) -> Rung:
+    """Return what the formula itself leaves: K = 1, no offset."""
+    records, reading = searched.problem.records, searched.problem.reading
+    modulus = case.gear.priors["E0"].numbers[0]
+    stiffness = float(THEORIES[case.gear.theory](case.gear.geometry, modulus))
+    rise = np.asarray(records.temperature) - reading.reference_temperature
+    soft = 1.0 - float(searched.problem.base.alpha) * rise
+    radial = np.asarray(records.deformation) * reading.radial_per_read
+    left = np.asarray(records.force) - stiffness * soft * radial
+    return Rung(model=FORMULA, rms_N=float(np.sqrt(np.mean(left**2))))

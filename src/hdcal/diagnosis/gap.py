@@ -1,141 +1,110 @@
-"""Whether model and measurement part, what is seen of it and where: typed values."""
+"""The gap between the base model and the readings, row by row."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Records
-from hdcal.report.answer import Count, Probability, Real, Words
-from hdcal.report.intervals import Interval
+from hdcal.evidence.noise_models import NoiseModel
+from hdcal.evidence.parts import Part, posterior, sampled_curves
+from hdcal.evidence.search import Searched
+from hdcal.evidence.table import OUTSIDE, Names
+
+_DRAWS = 600
 
 
 @dataclass(frozen=True)
-class Gap:
-    """Whether model and measurement part, and by how much.
+class GapByRow:
+    """What the base model leaves of the readings.
 
     Attributes:
-        detected: the residual test is significant at 5 %.
-        probability: posterior probability that anything is missing (1 − P(none)).
-        rms_N: root mean square of the gap at the tested rows, 95 % interval; NaN
-            where none is detected.
-        noise_sd_N: of a reading, without the gap.
-        share_of_full_scale: rms over the largest tested force [-].
-        autocorrelation: posterior mean of the noise's AR(1) coefficient [-].
-        rounding_N: step of rounded readings, where nothing else is detected.
+        records: the rows that were looked at, run after run: all, means of neighbours,
+            or one of several.
+        residual: reading less the base model fitted alone [N], shape (n,).
+        draws: of the gap, over all hypotheses [N], shape (d, n).
     """
 
-    detected: bool
-    probability: Probability
-    rms_N: Interval
-    noise_sd_N: Real
-    share_of_full_scale: Real
-    autocorrelation: Real
-    rounding_N: Real | None = None
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One pre-declared cell of the rows and the mean residual in it.
-
-    Attributes:
-        covariate: deformation, temperature, time, angle, direction, run, specimen
-            or a product such as `direction × deformation`.
-        label: for people, such as "0.36 … 0.54 mm" or "unloading".
-        from_: lower end in `unit`; NaN for labels.
-        to: upper end; NaN for labels.
-        unit: mm, °C, s, rad or "".
-        rows: number of rows.
-        bias_N: mean reading minus calibrated model, with the simultaneous 95 % band of
-            noise around it.
-        z: bias over its standard error under no gap.
-        share: of the squared gap that lies in this cell [-].
-    """
-
-    covariate: Words
-    label: str
-    from_: Real
-    to: Real
-    unit: str
-    rows: Count
-    bias_N: Interval
-    z: Real
-    share: Real
-
-    @property
-    def hot(self) -> bool:
-        """Whether the bias leaves the simultaneous band."""
-        return self.bias_N.lo > 0.0 or self.bias_N.hi < 0.0
-
-
-@dataclass(frozen=True)
-class CovariateShare:
-    """Part of the gap's variance along one covariate, 95 % interval."""
-
-    covariate: Words
-    share: Interval
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where the gap lies.
-
-    Attributes:
-        p_value: family-wise, of the residual test.
-        statistics: largest |z| over the cells and of the noise's shape, by name.
-        cells: every pre-declared cell.
-        shares: of the gap's variance by covariate; empty when no gap is detected.
-        residual_N: reading minus calibrated base model, shape (n,).
-        gap_N: smooth part of it (posterior mean), shape (n,).
-        records: the rows that were looked at: of the case, or means of neighbours.
-    """
-
-    p_value: float
-    statistics: dict[str, float]
-    cells: tuple[Cell, ...]
-    shares: tuple[CovariateShare, ...]
-    residual_N: np.ndarray
-    gap_N: np.ndarray
     records: Records
-
-    def values_of(self, covariate: str) -> np.ndarray | None:
-        """Return a covariate at each row; None of a product or of what was not read."""
-        if covariate == "angle":  # its ranges are those of one turn
-            return np.mod(self.records.angle, 2.0 * np.pi)
-        return getattr(self.records, covariate, None)
-
-    def by_covariate(self) -> tuple[dict[str, list[Cell]], dict[str, list[Cell]]]:
-        """Return the cells that have ends, deformation first, and those with a name.
-
-        Products come last.
-        """
-        ranges: dict[str, list[Cell]] = {"deformation": []}
-        names: dict[str, list[Cell]] = {}
-        for cell in sorted(self.cells, key=lambda cell: "×" in cell.covariate):
-            placed = np.isfinite([cell.from_, cell.to]).all()
-            kind = ranges if placed and "×" not in cell.covariate else names
-            kind.setdefault(cell.covariate, []).append(cell)
-        return ranges, names
-
-    @property
-    def regions(self) -> tuple[Cell, ...]:
-        """Return the hot cells, largest |z| first."""
-        return tuple(sorted((c for c in self.cells if c.hot), key=lambda c: -abs(c.z)))
+    residual: Float[np.ndarray, " n"]
+    draws: Float[np.ndarray, "d n"]
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What readings show, whatever its cause.
+class Fitted:
+    """The likeliest hypothesis with some effects, fitted to all rows.
 
     Attributes:
-        statement: in words.
-        covariate: with which it goes.
-        size_N: from its lowest to its highest place, simultaneous 95 % interval.
-        p_value: adjusted for all that was looked for.
-        material: it is more than a thousandth of the largest force.
+        noise: its model of the noise.
+        noise_sd: of a typical row [N].
+        rms: what is left beside the base model, then with each effect besides, then
+            with what is outside the library [N], by what was added last.
     """
 
-    statement: Words
-    covariate: Words
-    size_N: Interval
-    p_value: Probability
-    material: bool
+    noise: NoiseModel
+    noise_sd: float
+    rms: Mapping[str, float]
+
+
+def gap_by_row(
+    searched: Searched,
+    posterior_of: Mapping[Names, np.ndarray],
+    rng: np.random.Generator,
+) -> GapByRow:
+    """Return residuals and posterior draws of the gap.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior_of: probability of each, by model of the noise.
+        rng: source of randomness.
+    """
+    problem, table = searched.problem, searched.table
+    keys = [*posterior_of]
+    chance = np.array([posterior_of[key].sum() for key in keys])
+    draws = [np.zeros((0, len(problem.y)))]
+    for key, count in zip(keys, rng.multinomial(_DRAWS, chance), strict=True):
+        noise, parts = table.likeliest_noise(key), table.parts[key]
+        if count and not parts:
+            draws.append(np.zeros((count, len(problem.y))))
+        elif count:
+            curves = sampled_curves(problem, noise, parts, int(count), rng)
+            draws.append(curves.sum(axis=0) / noise.weight)
+    # The gap is projected in the same way, so that it lies among the residuals.
+    residual = problem.project(problem.y)
+    return GapByRow(problem.records, residual, np.concatenate(draws))
+
+
+def fitted(
+    searched: Searched,
+    posterior_of: Mapping[Names, np.ndarray],
+    names: Sequence[str],
+) -> Fitted:
+    """Return the likeliest hypothesis that holds some effects.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior_of: probability of each, by model of the noise.
+        names: of the effects on the mean reading; some of a hypothesis.
+    """
+    problem, table = searched.problem, searched.table
+    holding = [key for key in posterior_of if {*names} <= {*key}]
+    key = max(holding, key=lambda each: posterior_of[each].sum())
+    noise, parts = table.likeliest_noise(key), table.parts[key]
+    by_name = {table.names[part.component]: part for part in parts}
+    rms, added = {"": _rms(searched, noise, [])}, []
+    for name in (*names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
+        if name in by_name:
+            added.append(by_name[name])
+            rms[name] = _rms(searched, noise, added)
+    found = posterior(problem, noise, parts)
+    left = (problem.y - found.reading) * noise.weight
+    used = len(found.mean) - float(np.sum(found.factor**2))
+    free = max(problem.count - used, 1.0)
+    return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
+
+
+def _rms(searched: Searched, noise: NoiseModel, parts: Sequence[Part]) -> float:
+    problem = searched.problem
+    left = problem.y - posterior(problem, noise, parts).reading
+    return float(np.sqrt(np.mean(left**2)))

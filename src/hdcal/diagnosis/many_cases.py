@@ -1,11 +1,13 @@
 """Many cases: read all of them before any work, then diagnose one after the other."""
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
+from typing import TYPE_CHECKING, Literal
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.console import Console
@@ -13,9 +15,13 @@ from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
 from hdcal.data.reading import read_case
-from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, Findings, HdcalError, InputError
+from hdcal.report.item import Item
+from hdcal.report.result import Result
 from hdcal.report.saving import MARKER
+
+if TYPE_CHECKING:
+    from hdcal.diagnosis.result import Diagnosis
 
 Refused = Mapping[str, tuple[Finding, ...]]
 # What lies beside the folders of many cases.
@@ -99,9 +105,71 @@ def tell_notes(console: Console, asked: AskedCases) -> None:
             console.words(f"{case.name}: {note}" if asked.many else note)
 
 
+class Row(Item):
+    """One of many cases."""
+
+    case: str
+    verdict: str
+    headline: str
+    cause: str
+    probability: float | None
+    closed: float | None
+
+
+class Diagnoses(Result):
+    """What `hdcal diagnose` answers of many cases.
+
+    Attributes:
+        rows: one for each case that was diagnosed.
+        cases: their answers, by name.
+        refused: what is wrong with the others.
+    """
+
+    template = "diagnosis/many.md.j2"
+    table = "rows"
+
+    format: Literal["hdcal.verdicts/2"] = "hdcal.verdicts/2"
+    rows: tuple[Row, ...]
+    cases: dict[str, dict]
+    refused: dict[str, tuple[Finding, ...]]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many cases have each verdict."""
+        return Counter(row.verdict for row in self.rows)
+
+
+def overview(found: Mapping[str, "Answer"], refused: Refused) -> Diagnoses:
+    """Return the answers about many cases as one."""
+    failed = tuple(
+        f"{n}: failed" for n, a in found.items() if a.row.verdict == "FAILED"
+    )
+    return Diagnoses(
+        reasons=failed,
+        rows=tuple(answer.row for answer in found.values()),
+        cases={name: answer.plain for name, answer in found.items()},
+        refused=dict(refused),
+    )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is left of a diagnosis once its files are written.
+
+    Attributes:
+        row: of the overview.
+        plain: content of verdict.json.
+        shown: the diagnosis itself where there is a single one.
+    """
+
+    row: Row
+    plain: dict
+    shown: "Diagnosis | None"
+
+
 def diagnose_all(
     asked: AskedCases, folder: Path, *, jobs: int, command: str, **settings
-) -> tuple[dict[str, VerdictAnswer], AskedCases]:
+) -> tuple[dict[str, Answer], AskedCases]:
     """Diagnose every case and write its result.
 
     Args:
@@ -129,10 +197,10 @@ def diagnose_all(
                 place.mkdir()
             tasks = list(zip(cases, places, strict=True))
             outcomes = run_all(work, tasks, jobs, progress)
-    found: dict[str, VerdictAnswer] = {}
+    found: dict[str, Answer] = {}
     refused = dict(asked.refused)
     for case, outcome in zip(cases, outcomes, strict=True):
-        if isinstance(outcome, VerdictAnswer):
+        if isinstance(outcome, Answer):
             found[case.name] = outcome
         else:
             refused[case.name] = outcome
@@ -156,24 +224,52 @@ def _diagnose_one(
     report: bool,
     seed: int,
     progress=None,
-) -> VerdictAnswer | tuple[Finding, ...]:
+) -> Answer | tuple[Finding, ...]:
     """Return the answer, or what is wrong with the case."""
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library
-    from hdcal.diagnosis.summary import write_verdict
     from hdcal.physics.registry import EFFECTS
 
     effects = choose_library(library, EFFECTS)
     settings = {"quick": quick, "seed": seed}
     try:
-        verdict = diagnose(case, library=effects, progress=progress, **settings)
-        return write_verdict(verdict, folder, command, report=report)
+        found = diagnose(case, library=effects, progress=progress, **settings)
+        _write(found, folder, command, report=report)
     except InputError as error:
         return error.findings
     except (HdcalError, OSError):
         raise
     except Exception as error:
         return (_defect(case.name, error, alone),)
+    which, closed = found.which, found.how_far.closed
+    leading = next((c for c in which.causes if c.explains), which.outside)
+    row = Row(
+        case=case.name,
+        verdict=which.verdict if found.status == "ok" else "FAILED",
+        headline=found.headline,
+        cause=" or ".join(leading.members) or "outside the library",
+        probability=leading.probability,
+        closed=closed and closed.median,
+    )
+    return Answer(row, found.to_dict(), found if alone else None)
+
+
+def _write(found: "Diagnosis", folder: Path, command: str, *, report: bool) -> None:
+    """Write what `hdcal diagnose` leaves behind for one case."""
+    from hdcal.inference.posterior_file import FILE_NAME
+    from hdcal.prediction.bands.bands import default_bands
+    from hdcal.report.result_folder import page_files
+    from hdcal.report.table_files import columns_csv
+
+    files = {"verdict.json": found.to_json().encode()}
+    if (average := found.average) is not None:
+        bands = default_bands([*found.posteriors.values()])
+        files["bands.csv"] = columns_csv(dict(bands.to_frame())).encode()
+        files[FILE_NAME] = average.to_netcdf()
+    if report:
+        files |= page_files(found, command)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
 
 
 def _defect(name: str, error: Exception, alone: bool) -> Finding:

@@ -15,18 +15,18 @@ import numpy as np
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.case import Case
-from hdcal.diagnosis.model_posterior import ModelPosterior
-from hdcal.diagnosis.verdict import Which
-from hdcal.evidence.case_evidence import UNKNOWN
-from hdcal.inference.model_average import NONE, LeftOut
+from hdcal.evidence.fewer_rows import thin_rows
+from hdcal.evidence.table import OUTSIDE, Names
+from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
-from hdcal.report.intervals import credible_interval
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
+# Rows from which on a model takes minutes and more to calibrate.
+_MOST_ROWS = 5_000
 
 
 @dataclass(frozen=True)
@@ -34,26 +34,38 @@ class Refits:
     """Calibrated hypotheses.
 
     Attributes:
-        models: probability and posterior by hypothesis, of those that may be used;
+        posteriors: probability and posterior by hypothesis, of those that may be used;
             `none` for the plain model, `unknown` for that with a leftover gap. The
             probabilities sum to 1.
         left_out: what has no model among these; None without any.
         failed: calibrations that failed their checks.
     """
 
-    models: Mapping[str, tuple[float, Posterior]]
+    posteriors: Mapping[str, tuple[float, Posterior]]
     left_out: LeftOut | None
     failed: Mapping[str, Posterior]
 
     @property
     def likeliest(self) -> str | None:
         """Name of the most probable one."""
-        return max(self.models, key=lambda name: self.models[name][0], default=None)
+        return max(
+            self.posteriors, key=lambda name: self.posteriors[name][0], default=None
+        )
+
+
+def rows_to_calibrate(case: Case) -> Case:
+    """Return the case with at most about 5,000 single rows, the turns among them."""
+    rows = len(case.records.force)
+    if rows <= _MOST_ROWS:
+        return case
+    few = thin_rows(case, -(-rows // _MOST_ROWS), turns=True)
+    words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
+    return replace(few, notes=(*few.notes, words))
 
 
 def refit(
     case: Case,
-    posterior: ModelPosterior,
+    hypotheses: Mapping[Names, float],
     library: dict[str, type[Effect]],
     seed: int,
     progress: Progress | None,
@@ -64,7 +76,7 @@ def refit(
 
     Args:
         case: data and gear.
-        posterior: over hypotheses.
+        hypotheses: their probabilities, sum 1.
         library: effects by name.
         seed: of the sampler.
         progress: of it.
@@ -72,8 +84,8 @@ def refit(
     """
     if quick:
         return Refits({}, None, {})
-
-    count, finished = len(_probable(posterior.probabilities)), 0
+    probabilities = {_name(names): chance for names, chance in hypotheses.items()}
+    count, finished = len(_probable(probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
         nonlocal finished
@@ -94,7 +106,12 @@ def refit(
             progress=progress and tell,
         )
 
-    return weighed(posterior.probabilities, calibrated)
+    return weighed(probabilities, calibrated)
+
+
+def _name(names: Names) -> str:
+    """Return the name under which a model is stored."""
+    return "+".join(names).replace(OUTSIDE, UNKNOWN) or NONE
 
 
 def weighed(
@@ -171,25 +188,9 @@ def _widest(fits: Mapping[str, Posterior]) -> str:
     return max(fits, key=lambda name: float(np.std(fits[name].draws["stiffness"])))
 
 
-def with_sampled_size(which: Which, fits: Refits) -> Which:
-    """Return the verdict with the named effect's size from its calibration.
-
-    There the zero of the deformation is inferred too, about which the closed form
-    only expands.
-    """
-    size, likeliest = which.amplitude, fits.likeliest
-    if size is None or likeliest is None or size.effect not in likeliest.split("+"):
-        return which
-    _, posterior = fits.models[likeliest]
-    draws = posterior.draws.get(f"{size.effect}.{size.parameter}")
-    if draws is None:
-        return which
-    return replace(which, amplitude=replace(size, **vars(credible_interval(draws))))
-
-
 def failure_reasons(fits: Refits) -> tuple[str, ...]:
     """Say why nothing may be used: every calibration failed."""
-    if fits.models:
+    if fits.posteriors:
         return ()
     return tuple(
         f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)

@@ -16,9 +16,7 @@ from hdcal.data.loading import loading_side
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.diagnosis.contrasts import Contrast, contrasts
-from hdcal.diagnosis.gap import Seen
-from hdcal.evidence.case_evidence import CaseEvidence
-from hdcal.evidence.prepare import MODULUS_LOSS, PreparedCase
+from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.inference.distributions import moments
 from hdcal.inference.residual_shapes import (
     Correlated,
@@ -28,7 +26,7 @@ from hdcal.inference.residual_shapes import (
 )
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.quantities import Quantities
-from hdcal.report.intervals import INTERVAL, Interval
+from hdcal.report.item import INTERVAL, Interval, Item, Probability, Words
 from hdcal.report.words import load
 
 # Below this share of the largest force what is seen is said to be immaterial.
@@ -38,32 +36,51 @@ _ANY_MATERIAL = 1e-3
 # Correlation of neighbouring readings where the gear file states none: most rigs read
 # independently, loggers with filters do not.
 _CORRELATION = Prior("beta", (0.5, 1.5))
+# Column of the base model: stiffness, zero of the force, loss of modulus, contact.
+_MODULUS_LOSS = 2
 # Swing of a column, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
 
 
-def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
+class Seen(Item):
+    """What readings show, whatever its cause.
+
+    Attributes:
+        statement: in words.
+        covariate: with which it goes.
+        size_N: from its lowest to its highest place, simultaneous 95 % interval.
+        p_value: adjusted for all that was looked for.
+        material: it is more than a thousandth of the largest force.
+    """
+
+    statement: Words
+    covariate: Words
+    size_N: Interval
+    p_value: Probability
+    material: bool
+
+
+def what_is_seen(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
     """Return the contrasts that noise would rarely show, the clearest first.
 
     Args:
-        evidence: for the rows and the base model.
+        problem: rows and base model.
         case: for labels and the correlation of its noise.
     """
-    prepared = evidence.prepared
     # Of a gear that is pulled, what is said is said of the size of its force.
-    side = loading_side(np.asarray(prepared.records.deformation))
+    side = loading_side(np.asarray(problem.records.deformation))
     sign = float(side or 1)
-    own = moments(prepared.priors["alpha"])[1] < _ANY_MATERIAL
-    turned = _turned(prepared.records, sign)
+    own = moments(problem.priors["alpha"])[1] < _ANY_MATERIAL
+    turned = _turned(problem.records, sign)
     every = list(contrasts(turned, case, both=side == 0, own=own))
     tried = {str(i): c for i, c in enumerate(every) if c.swing > _NOTHING}
-    sd = prepared.noise_sd / np.asarray(prepared.rows.weight)
+    sd = problem.noise_sd / np.asarray(problem.weight)
     stated = case.gear.scale_priors[CORRELATION]
     expected = _CORRELATION if stated.family == "uniform" else stated
-    noise = Correlated(prepared.rows.before, expected)
-    data = _whitened(prepared, tried, sd, sign, own=own)
+    noise = Correlated(problem.before, expected)
+    data = _whitened(problem, tried, sd, sign, own=own)
     found = _found(data, sd, noise, np.asarray(turned.run))
-    scale = float(np.max(np.abs(prepared.records.force)))
+    scale = float(np.max(np.abs(problem.records.force)))
     quantile = float(-ndtri((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
     # A loop is told once, by the shape that shows it best.
     once: dict[str, Structure] = {}
@@ -107,10 +124,12 @@ def _as_one(told: list[Seen], size: float, words: str) -> tuple[Seen, ...]:
     # A difference of two runs, of which each contrast says one against the mean; that
     # of the last one is beside all the others.
     half = np.sqrt(2.0) * min(each.size_N.hi - each.size_N.median for each in zeros)
-    whole = replace(
-        zeros[0],
+    low, high = max(size - half, 0.0), size + half
+    whole = Seen(
         statement=words,
-        size_N=Interval(size, float(max(size - half, 0.0)), float(size + half)),
+        covariate="run",
+        size_N=Interval(median=size, lo=float(low), hi=float(high)),
+        p_value=zeros[0].p_value,
         material=any(each.material for each in zeros),
     )
     return (*others[:place], whole, *others[place:])
@@ -147,7 +166,7 @@ def _turned(records: Records, sign: float) -> Records:
 
 
 def _whitened(
-    prepared: PreparedCase,
+    problem: LinearProblem,
     tried: dict[str, Contrast],
     sd: np.ndarray,
     sign: float,
@@ -158,14 +177,14 @@ def _whitened(
 
     A loss of modulus is taken up as far as the material's `own` prior allows.
     """
-    base = prepared.rows.base
+    base = problem.X
     if not own:
-        base = np.delete(base, MODULUS_LOSS, axis=1)
+        base = np.delete(base, _MODULUS_LOSS, axis=1)
     width = base.shape[1]
     below = np.eye(width)[2:]
     nothing = np.zeros(width - 2)
     return Whitened(
-        residual=np.concatenate([sign * prepared.rows.reading / sd, nothing]),
+        residual=np.concatenate([sign * problem.y / sd, nothing]),
         absorbed=np.vstack([base / sd[:, None], below]),
         shapes={
             name: (np.concatenate([each.column / sd, nothing]), "", "")
@@ -183,7 +202,7 @@ def _seen(
 ) -> Seen:
     swing = abs(found.coefficient) * contrast.swing
     half = quantile * found.error * contrast.swing
-    size = Interval(swing, max(swing - half, 0.0), swing + half)
+    size = Interval(median=swing, lo=max(swing - half, 0.0), hi=swing + half)
     way, told = contrast.ways[found.coefficient < 0.0], load(size.median, units)
     return Seen(
         statement=units.say(contrast.words.format(way=way, size=told)),

@@ -1,136 +1,99 @@
-"""Structure that no smooth function shows: in a stretch of rows, or with a period.
+"""Local structure outside the library: one stretch of rows, or one period.
 
-Stretches are dyadic windows along each order of the rows; periods are those of
-Fourier's, from row to row and by the clock: mains and thermostats know nothing of rows.
-They are too many for an evidence of each: of each family the direction that
-the data show most represents all, and its evidence is divided by their number, which
-is a lower bound of the family's own.
+Of each family of directions the likeliest member takes part, with the prior of one
+among all of them.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-
 import numpy as np
+from jaxtyping import Float
 
-from hdcal.data.records import Records
-from hdcal.evidence.linear_rows import remove_base
-from hdcal.evidence.prepare import PreparedCase
+from hdcal.evidence.components import Space
+from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.remainder import remainder_space
 
-# Windows are no shorter than this many rows, nor than this share of all.
-_SHORTEST, _FINEST = 2, 1.0 / 32.0
-_MOST_PERIODS, _MOST_BY_TIME = 96, 384
-# Rows are uneven in time where a step is this many times a usual one. A pause counts as
-# no more than this many: over a long one no period keeps its phase.
-_UNEVEN, _PAUSE = 1.5, 30.0
+Family = Float[np.ndarray, "f 2 n"]
 
-
-@dataclass(frozen=True)
-class DirectionFamily:
-    """Directions of one kind.
-
-    Attributes:
-        name: for the table of kernels.
-        columns: shape (m, n); a family member has `width` of them in a row.
-        width: columns of each member.
-    """
-
-    name: str
-    columns: np.ndarray
-    width: int
+# Shortest stretch as a share of all rows; most periods, by rows and by the clock.
+_FINEST, _MOST_PERIODS, _MOST_BY_TIME = 1.0 / 32.0, 96, 384
+# Rows are uneven in time where the longest step is so many median ones; pauses count
+# as at most so many.
+_UNEVEN, _LONGEST_PAUSE = 1.5, 30.0
 
 
-def direction_families(records: Records) -> list[DirectionFamily]:
-    """Return every family of local or periodic directions.
-
-    Args:
-        records: rows, run after run.
-    """
-    rows = len(records.force)
-    order = np.arange(rows)
-    # Of one sign where it is largest: compression may be read as negative.
-    deformation = np.asarray(records.deformation)
-    deformation = deformation / deformation[np.argmax(np.abs(deformation))]
-    paths = {"order": order, "deformation": np.argsort(deformation, kind="stable")}
+def local_families(problem: LinearProblem) -> list[Family]:
+    """Return families of directions: stretches in two orders, periods, by the clock."""
+    count = len(problem.y)
+    deformation = np.asarray(problem.records.deformation)
+    slope = deformation / deformation[np.argmax(np.abs(deformation))]
     found = []
-    for name, path in paths.items():
-        inside = _windows(rows)
+    for path in (np.arange(count), np.argsort(slope, kind="stable")):
+        inside = _stretches(count)
         table = np.zeros_like(inside)
         table[:, path] = inside
-        # A stretch may be off by a force, or by a part of the stiffness.
-        pairs = np.stack([table, table * deformation], axis=1).reshape(-1, rows)
-        found.append(DirectionFamily(f"stretch of {name}", pairs, 2))
-    count = min(rows // 2, _MOST_PERIODS)
-    found.append(DirectionFamily("period", _waves(order / rows, count), 2))
-    clock = _clock(records)
-    if clock is not None:
-        found.append(DirectionFamily("period of time", _waves(*clock), 2))
-    return found
+        # A stretch may be off by a force or by a part of the stiffness.
+        found.append(np.stack([table, table * slope], axis=1))
+    found.append(_waves(np.arange(count) / count, min(count // 2, _MOST_PERIODS)))
+    found += _by_the_clock(problem)
+    return [family for family in found if len(family)]
 
 
-def _clock(records: Records) -> tuple[np.ndarray, int] | None:
-    """Return when each row was read, from 0 to 1, and how many turns rows can show.
-
-    None where the time is not known, or says no more than the order of the rows.
-    """
+def _by_the_clock(problem: LinearProblem) -> list[Family]:
+    """Return periods in time, where rows are uneven in it."""
+    records = problem.records
     step = np.maximum(np.diff(np.asarray(records.time, float)), 0.0)
-    # Each run has a clock of its own.
     step[np.diff(np.asarray(records.run)) != 0] = 0.0
     moves = step[step > 0.0]
     if "time" not in records.known or not len(moves):
-        return None
+        return []
     usual = float(np.median(moves))
     if np.max(moves) < _UNEVEN * usual:
-        return None
-    step = np.minimum(step, _PAUSE * usual)
-    whole = float(np.sum(step))
-    at = np.concatenate([[0.0], np.cumsum(step)]) / whole
-    return at, min(int(0.5 * whole / usual), _MOST_BY_TIME)
+        return []
+    step = np.minimum(step, _LONGEST_PAUSE * usual)
+    place = np.concatenate([[0.0], np.cumsum(step)]) / np.sum(step)
+    return [_waves(place, min(int(0.5 * np.sum(step) / usual), _MOST_BY_TIME))]
 
 
-def _waves(place: np.ndarray, most: int) -> np.ndarray:
-    """Return cosine and sine of 2 and more turns over a place from 0 to 1."""
-    turns = 2.0 * np.pi * np.arange(2, most + 1)[:, None] * place
-    return np.stack([np.cos(turns), np.sin(turns)], axis=1).reshape(-1, len(place))
-
-
-def _windows(rows: int) -> np.ndarray:
-    """Return 1 inside each window of half-overlapping dyadic lengths, shape (m, n)."""
-    length = rows // 2
-    found = [np.zeros((0, rows))]
-    while length >= max(_SHORTEST, rows * _FINEST):
-        starts = np.arange(0, rows - length + 1, max(length // 2, 1))
-        place = np.arange(rows) - starts[:, None]
+def _stretches(count: int) -> Float[np.ndarray, "f n"]:
+    """Return indicators of stretches that overlap by half, each half as long."""
+    length, found = count // 2, [np.zeros((0, count))]
+    while length >= max(2, count * _FINEST):
+        starts = np.arange(0, count - length + 1, max(length // 2, 1))
+        place = np.arange(count) - starts[:, None]
         found.append(((place >= 0) & (place < length)).astype(float))
         length //= 2
     return np.concatenate(found)
 
 
-def likeliest_directions(
-    case: PreparedCase, families: Iterable[DirectionFamily]
-) -> list[tuple[str, np.ndarray, float]]:
-    """Return of each family the member that the data show most.
+def _waves(place: Float[np.ndarray, " n"], most: int) -> Family:
+    turns = 2.0 * np.pi * np.arange(2, most + 1)[:, None] * place
+    return np.stack([np.cos(turns), np.sin(turns)], axis=1)
+
+
+def likeliest_members(
+    problem: LinearProblem, families: list[Family], owner: int
+) -> list[Space]:
+    """Return the member of each family that the readings show most.
 
     Args:
-        case: whose readings choose.
-        families: of its records.
-
-    Returns:
-        Name, columns (width, n) and log of the number of members.
+        problem: the case, its base with all that is taken as known.
+        families: of pairs of directions.
+        owner: index of the remainder among the components.
     """
-    rows = case.rows
-    error = remove_base(rows, rows.reading[None])[0]
+    error = problem.project(problem.y)
+    half = np.linalg.solve(problem.root.T, problem.X.T).T
     found = []
     for family in families:
-        left = remove_base(rows, family.columns)
-        table = left.reshape(-1, family.width, left.shape[-1])
-        if not len(table):
-            continue
-        gram = np.einsum("mkn,mln->mkl", table, table)
-        ridge = 1e-9 * np.trace(gram, axis1=1, axis2=2).max() * np.eye(family.width)
-        along = table @ error
-        gained = np.linalg.solve(gram + ridge, along[..., None])[..., 0]
-        best = int(np.argmax(np.sum(along * gained, axis=1)))
-        start = best * family.width
-        columns = family.columns[start : start + family.width]
-        found.append((family.name, columns, float(np.log(len(table)))))
+        inside = family @ half
+        gram = family @ np.swapaxes(family, 1, 2) - inside @ np.swapaxes(inside, 1, 2)
+        (a, b), (_, d) = np.moveaxis(gram, 0, -1)
+        ridge = 1e-9 * np.max(a + d)
+        a, d = a + ridge, d + ridge
+        one, two = (family @ error).T
+        # Decrease of the squared error by the best combination of both directions.
+        gain = (d * one**2 - 2.0 * b * one * two + a * two**2) / (a * d - b**2)
+        best = problem.project(family[int(np.argmax(gain))])
+        size = np.sqrt(np.sum(np.mean(best**2, axis=1)))
+        if size > 0.0:
+            space = remainder_space(problem, owner, best / size, len(family))
+            found.append(space)
     return found

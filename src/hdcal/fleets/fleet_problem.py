@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step
-from hdcal.evidence.prepare import moments, stiffness_prior
+from hdcal.evidence.linear_problem import moments, stiffness_prior
 from hdcal.fleets.change_points import middle_sd
 from hdcal.fleets.gear_sums import GearSums, MountingSums, gear_sums, stretched
 from hdcal.fleets.groupings import Grouping
@@ -93,10 +93,10 @@ def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
     """Return the stiffness at K = 1 [N/mm as read], and the priors of all sites."""
     own = problem_priors(case, (), {}, case.gear.theory)
     half = 0.5 if case.gear.reading == "diametral" else 1.0
-    log_mean, log_sd, nominal, _ = stiffness_prior(case, own)
+    log_mean, log_sd, nominal = stiffness_prior(case, own)
     centre = half * float(np.exp(log_mean))
-    zero, gauge_sd = moments(own["force_offset"])
-    place, contact_sd = moments(own["deformation_offset"])
+    zero, gauge_sd = moments(own, "force_offset")
+    place, contact_sd = moments(own, "deformation_offset")
     zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
     return half * nominal, {
         "stiffness": Prior("lognormal", (centre, log_sd)),

@@ -8,11 +8,11 @@ import numpy as np
 from hdcal.data.case import Case, Gear
 from hdcal.data.measurements.bad_gears import among
 from hdcal.errors import Finding, InputError, quoted
-from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows
 from hdcal.fleets.gear_sums import MountingSums, stretched
 from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import group_of, read_by
+from hdcal.inference import distributions
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def largest_of(of_row: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def modulus_left(gear: Gear, temperature):
     """Return the modulus at temperatures [°C] over that at the reference."""
-    loss, _ = moments(gear.priors["alpha"])
+    loss, _ = distributions.moments(gear.priors["alpha"])
     return 1.0 - loss * (temperature - gear.reference_temperature)
 
 

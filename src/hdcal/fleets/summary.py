@@ -8,7 +8,6 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import shortened
-from hdcal.evidence.prepare import moments
 from hdcal.fleets.answer import (
     FleetAnswer,
     FutureGear,
@@ -29,6 +28,7 @@ from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.fleets.notes import notes_of
 from hdcal.fleets.off_in import FALSE_CALLS
 from hdcal.fleets.over_time import time_answer, time_series
+from hdcal.inference.distributions import moments
 from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.report.document import mapped
 from hdcal.report.intervals import INTERVAL, Interval, credible_interval

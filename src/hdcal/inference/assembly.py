@@ -18,7 +18,7 @@ from hdcal.inference.checks import (
     identification_checks,
     sampling_checks,
 )
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.identifiability import unidentified
@@ -72,7 +72,7 @@ def assemble(
     draws: Draws,
     specifics: Specifics,
     seed: int,
-) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
+) -> tuple[xr.DataTree, dict[str, Convergence], tuple[Check, ...]]:
     """Return the tree, diagnoses and checks of a posterior.
 
     Args:

@@ -41,7 +41,7 @@ class Mixing:
 
 
 @dataclass(frozen=True)
-class Diagnosis(Mixing):
+class Convergence(Mixing):
     """Convergence of a parameter, and what decides it.
 
     Attributes:
@@ -108,7 +108,7 @@ def diagnose_parameters(
     priors: Mapping[str, Prior],
     log_prior: np.ndarray,
     log_likelihood: np.ndarray,
-) -> dict[str, Diagnosis]:
+) -> dict[str, Convergence]:
     """Return the convergence of each scalar parameter, and what decides it.
 
     Args:
@@ -124,7 +124,7 @@ def diagnose_parameters(
         contraction = _contraction(draws[name], priors[name], name)
         weak = to_data[name] < SENSITIVE < to_prior[name]
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
-        diagnoses[name] = Diagnosis(
+        diagnoses[name] = Convergence(
             **asdict(mixed),
             contraction=contraction,
             prior_sensitivity=to_prior[name],

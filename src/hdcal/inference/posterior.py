@@ -15,7 +15,7 @@ from hdcal.data.priors import Prior
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.diagnostics import Convergence
 from hdcal.inference.posterior_file import (
     CALIBRATION,
     content,
@@ -68,7 +68,7 @@ class Posterior(Shown):
     effects: tuple[type[Effect], ...]
     priors: Mapping[str, Prior]
     tree: xr.DataTree
-    diagnoses: Mapping[str, Diagnosis]
+    diagnoses: Mapping[str, Convergence]
     checks: tuple[Check, ...]
     settings: Mapping[str, Any]
 
@@ -204,7 +204,7 @@ class Posterior(Shown):
                 effects=_look_up(model["effects"], effects, file),
                 priors=restore_priors(model["priors"]),
                 tree=tree,
-                diagnoses={n: Diagnosis(**d) for n, d in model["diagnoses"].items()},
+                diagnoses={n: Convergence(**d) for n, d in model["diagnoses"].items()},
                 checks=tuple(Check(**check) for check in model["checks"]),
                 settings=model["settings"],
             )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.inference.diagnostics import Diagnosis, Driver
+from hdcal.inference.diagnostics import Convergence, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
 from hdcal.report.answer import Promise, Real, Words
@@ -59,7 +59,7 @@ def _code_unit(posterior: Posterior, name: str) -> tuple[str, float]:
 
 _NONE = math.nan
 # Of a parameter that was not sampled, because the gear file fixes it.
-_FIXED = Diagnosis(
+_FIXED = Convergence(
     rhat=_NONE,
     ess_bulk=_NONE,
     ess_tail=_NONE,
@@ -88,7 +88,7 @@ def measured(
 
 
 def _estimate(
-    posterior: Posterior, name: str, found: Diagnosis | None
+    posterior: Posterior, name: str, found: Convergence | None
 ) -> ParameterEstimate:
     unit, factor = unit_of(posterior, name)
     ends = credible_interval(posterior.draws[name] * factor)

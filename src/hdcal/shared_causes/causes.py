@@ -12,13 +12,13 @@ from hdcal.cli.processes import run_all
 from hdcal.data.case import Case, require_force
 from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.plausible import implausible
+from hdcal.diagnosis.decision import TEMPERATURE
+from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.explanation.library import library_of
+from hdcal.evidence.table import OUTSIDE
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.usable import usable
-from hdcal.hypotheses.decision import TEMPERATURE
-from hdcal.hypotheses.table import OUTSIDE
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress

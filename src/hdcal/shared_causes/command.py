@@ -40,7 +40,7 @@ def causes(
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
-    from hdcal.explanation.library import choose_library
+    from hdcal.diagnosis.library import choose_library
     from hdcal.physics.registry import EFFECTS
 
     with console.wrong as wrong:

@@ -10,13 +10,13 @@ from threadpoolctl import threadpool_limits
 
 from hdcal.data.case import Case
 from hdcal.data.scatter import require_scatter
+from hdcal.diagnosis.acting import share_closed
 from hdcal.errors import Finding, Findings, quoted
+from hdcal.evidence.noise_models import PRIOR_ODDS
+from hdcal.evidence.parts import sampled_curves
 from hdcal.evidence.row_features import take_rows
-from hdcal.hypotheses.acting import share_closed
-from hdcal.hypotheses.noise_models import PRIOR_ODDS
-from hdcal.hypotheses.parts import sampled_curves
-from hdcal.hypotheses.search import Searched, search
-from hdcal.hypotheses.table import OUTSIDE, Names
+from hdcal.evidence.search import Searched, search
+from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.physics.effect import Effect
 
 NONE = "none"

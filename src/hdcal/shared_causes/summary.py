@@ -8,7 +8,7 @@ from hdcal.data.case import Case
 from hdcal.data.measurements.bad_gears import cause as fault
 from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.theory_names import SPRING
-from hdcal.hypotheses.table import OUTSIDE
+from hdcal.evidence.table import OUTSIDE
 from hdcal.inference.checks import Check
 from hdcal.report.item import Interval
 from hdcal.shared_causes.frequencies import Frequencies

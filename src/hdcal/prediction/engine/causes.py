@@ -87,7 +87,7 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
 
     Args:
         models: a posterior, several with the probabilities of their models, a model
-            average, or a verdict.
+            average, or a diagnosis.
         allow_failed: also calibrations that failed their checks.
 
     Raises:

@@ -8,7 +8,7 @@ from hdcal.inference.posterior import Posterior
 
 
 class Averaged(Protocol):
-    """What holds calibrated models with their probabilities: a verdict."""
+    """Calibrated models with their probabilities, as a diagnosis holds them."""
 
     @property
     def posteriors(self) -> Mapping[str, tuple[float, Posterior]]:
@@ -23,7 +23,7 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
     """Return models with their weights.
 
     Raises:
-        InputError: it is no calibrated model, or a verdict without any.
+        InputError: it is no calibrated model, or a diagnosis without any.
     """
     if isinstance(models, Posterior):
         return [(1.0, models)]
@@ -31,7 +31,7 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
     if held is None and isinstance(models, Sequence):
         return models
     if not held:
-        quick = " and a quick verdict holds none" * (held is not None)
+        quick = " and a quick diagnosis holds none" * (held is not None)
         words = f"{type(models).__name__} is no calibrated model{quick}"
         remedy = "Give what calibrate or diagnose returned, itself"
         remedy += "; diagnose without quick" * bool(quick)

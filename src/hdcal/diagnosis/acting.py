@@ -1,0 +1,160 @@
+"""What acts in the draws of each hypothesis, and which share of the gap it closes.
+
+The gap is what the acting components leave beside the base model. A component acts in a
+draw where the rows show it: a coefficient that happens to be tiny is none.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.evidence.parts import sampled_curves
+from hdcal.evidence.search import Searched
+from hdcal.evidence.table import OUTSIDE, Names
+
+# A component acts from this squared visible length on, in noise variances, and from
+# this rms on, as a share of the largest force.
+_SHOWN, _MATTERS = 6.0, 1e-3
+# Hypotheses of less probability are not drawn from: all that they contain acts.
+_NEGLIGIBLE, _DRAWS = 3e-3, 200
+# Effects that close less of the gap than this leave it outside the library.
+_CARRIED = 0.5
+
+
+@dataclass(frozen=True)
+class Acting:
+    """Draws of one hypothesis and noise model that agree in what acts.
+
+    Attributes:
+        weight: their probability.
+        components: that act on the mean reading, sorted.
+        noise: effect on the noise, empty without one.
+        closed: share of the gap's rms that each class closes, and the remainder, by
+            name, shape (d,); empty where no draws were made.
+        carried: share that all effects of the library close together, shape (d,).
+        rms: of the gap [N], shape (d,).
+    """
+
+    weight: float
+    components: Names
+    noise: str
+    closed: Mapping[str, Float[np.ndarray, " d"]]
+    carried: Float[np.ndarray, " d"]
+    rms: Float[np.ndarray, " d"]
+
+    def explanations(self) -> dict[Names, float]:
+        """Return explanations of the draws and their shares of them.
+
+        An explanation are the effects that act, or `OUTSIDE` where these close less
+        than half of the gap; () is none.
+        """
+        effects = [name for name in self.components if name != OUTSIDE]
+        noise = [self.noise] if self.noise else []
+        names = tuple(sorted([*effects, *noise]))
+        if OUTSIDE not in self.components:
+            return {names: 1.0}
+        outside = float(np.mean(self.carried < _CARRIED)) if effects else 1.0
+        return {(OUTSIDE,): outside, names: 1.0 - outside}
+
+
+def acting(
+    searched: Searched,
+    posterior: Mapping[Names, np.ndarray],
+    class_of: Mapping[str, str],
+    rng: np.random.Generator,
+) -> list[Acting]:
+    """Return what acts in each hypothesis and noise model.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior: probability of each, by model of the noise.
+        class_of: name of the class of each effect that has one.
+        rng: source of randomness.
+    """
+    table, found = searched.table, []
+    for key, chance in posterior.items():
+        by_noise: dict[str, float] = defaultdict(float)
+        for noise, each in zip(table.noises, chance, strict=True):
+            by_noise[noise.name] += float(each)
+        drawn: list[Acting] = []
+        if key and max(by_noise.values()) >= _NEGLIGIBLE:
+            drawn = [*_drawn(searched, key, class_of, rng)]
+        whole = [Acting(1.0, key, "", {}, np.ones(1), np.zeros(0))]
+        for name, weight in by_noise.items():
+            for each in drawn if weight >= _NEGLIGIBLE and drawn else whole:
+                found.append(_weighted(each, weight, name))
+    return found
+
+
+def _weighted(each: Acting, weight: float, noise: str) -> Acting:
+    return replace(each, weight=each.weight * weight, noise=noise)
+
+
+def _drawn(
+    searched: Searched,
+    key: Names,
+    class_of: Mapping[str, str],
+    rng: np.random.Generator,
+) -> Iterator[Acting]:
+    """Yield draws of one hypothesis, by which of its components act."""
+    problem, table = searched.problem, searched.table
+    parts, noise = table.parts[key], table.likeliest_noise(key)
+    names = [table.names[part.component] for part in parts]
+    curves = sampled_curves(problem, noise, parts, _DRAWS, rng)
+    # Structure within the rounding of a coarse reading shows nothing.
+    largest = float(np.quantile(np.abs(problem.records.force), 0.99))
+    least = max(_MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
+    square = np.sum(curves**2, axis=2)
+    shown = square > _SHOWN * problem.noise_sd**2
+    shown &= square > least**2 * curves.shape[2]
+    gaps = np.einsum("kd,kdn->dn", shown, curves)
+    # What points away from the gap only makes up for another component.
+    shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0
+    for pattern in np.unique(shown.T, axis=0):
+        these = np.all(pattern == shown.T, axis=1)
+        acts = [k for k, on in enumerate(pattern) if on]
+        curve = {names[k]: curves[k, these] for k in acts}
+        gap = gaps[these]
+        classes: dict[str, list[np.ndarray]] = defaultdict(list)
+        for name, values in curve.items():
+            classes[class_of.get(name, name)].append(values)
+        effects = [values for name, values in curve.items() if name != OUTSIDE]
+        yield Acting(
+            weight=float(these.mean()),
+            components=tuple(sorted(curve)),
+            noise="",
+            closed={name: share_closed(gap, each) for name, each in classes.items()},
+            carried=share_closed(gap, effects),
+            rms=np.sqrt(np.mean(gap**2, axis=1)),
+        )
+
+
+def share_closed(
+    gap: Float[np.ndarray, "d n"], curves: Sequence[Float[np.ndarray, "d n"]]
+) -> Float[np.ndarray, " d"]:
+    """Return the share of the rms of gaps that one or two curves close.
+
+    At their best amplitudes, which are not negative: a curve that points away from the
+    gap closes nothing.
+
+    Args:
+        gap: of each draw.
+        curves: none, one or two of each draw.
+    """
+    if not len(curves):
+        return np.zeros(len(gap))
+    stacked = np.stack(curves, axis=1)
+    along = np.einsum("dkn,dn->dk", stacked, gap)
+    gram = stacked @ np.swapaxes(stacked, 1, 2)
+    own = np.maximum(np.einsum("dkk->dk", gram), 1e-300)
+    best = np.max(np.maximum(along, 0.0) ** 2 / own, axis=1)
+    if len(curves) == 2:
+        ridge = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        both = np.linalg.solve(gram + ridge, along[..., None])[..., 0]
+        inside = np.all(both > 0.0, axis=1)
+        best = np.where(inside, np.sum(both * along, axis=1), best)
+    left = 1.0 - best / np.maximum(np.sum(gap**2, axis=1), 1e-300)
+    return 1.0 - np.sqrt(np.clip(left, 0.0, 1.0))

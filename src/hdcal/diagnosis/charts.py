@@ -1,0 +1,172 @@
+"""Charts of a diagnosis: where the gap lies, which effects act, how far it closes."""
+
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.loading import movement_words
+from hdcal.diagnosis.gap import GapByRow
+from hdcal.diagnosis.wording import ALL, either
+from hdcal.quantities import Quantities
+from hdcal.report.axes import displacement_axis, load_axis
+from hdcal.report.chart_spec import (
+    BLUE,
+    GREY,
+    ORANGE,
+    SKY,
+    Band,
+    Bars,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+    drawn_rows,
+)
+from hdcal.report.item import INTERVAL
+from hdcal.report.words import percent
+
+if TYPE_CHECKING:
+    from hdcal.diagnosis.result import Cause, HowFar, Which
+
+# Classes that are shown, the least probability of one, and from which on its share of
+# the gap is written with it.
+_MOST, _LEAST, _LIKELY = 8, 0.01, 0.5
+# Names of a class beside its bar.
+_NAMES = 3
+# With more half cycles than this bands would cover each other: medians stay.
+_MOST_BANDS = 40
+_COLOURS = {1: BLUE, -1: ORANGE}
+# What the formula leaves hides the rest of the ladder, and stays in the table.
+FORMULA = "formula with K = 1"
+
+
+def gap_chart(case: Case, rows: GapByRow) -> Chart:
+    """Return residuals over deformation with the posterior of the gap as bands."""
+    records, points, bands, lines = rows.records, list[Mark](), list[Mark](), []
+    x, sense = np.asarray(records.deformation), np.asarray(records.sense)
+    words = movement_words(x, case.units.displacement)
+    drawn = drawn_rows(rows.residual)
+    halves = _half_cycles(sense, np.asarray(records.run))
+    for way, colour in _COLOURS.items():
+        here = sense == way
+        if not here.any():
+            continue
+        some = drawn[here[drawn]]
+        points.append(
+            Points(label=words[way], x=x[some], y=rows.residual[some], colour=colour)
+        )
+        some = [half for half in halves if here[half[0]] and len(half) > 1]
+        # One entry of the legend is enough for all half cycles.
+        names = [f"gap, {words[way]}", *[""] * len(some)]
+        for name, half in zip(names, some, strict=False):
+            band, line = _gap(x, rows.draws, half, name, colour, len(some))
+            lines.append(line)
+            if len(some) <= _MOST_BANDS:
+                bands.append(band)
+    panel = Panel(
+        x=displacement_axis(case),
+        y=load_axis(case.units, "measured − model"),
+        marks=[Rule(at=0.0), *bands, *points, *lines],
+        title=f"{case.name}: what the straight model leaves",
+        wide=True,
+        height=4.0,
+        legend_beside=True,
+    )
+    return Chart(panels=[panel])
+
+
+def _half_cycles(sense: np.ndarray, run: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of each stretch of one direction within a run."""
+    turns = np.flatnonzero((np.diff(sense) != 0) | (np.diff(run) != 0)) + 1
+    return np.split(np.arange(len(sense)), turns)
+
+
+def _gap(
+    x: np.ndarray,
+    draws: np.ndarray,
+    half: np.ndarray,
+    name: str,
+    colour: str,
+    count: int,
+) -> tuple[Band, Line]:
+    """Return interval and median of the gap over the rows of a half cycle.
+
+    Bands of many half cycles, `count`, lie over each other: each is paler.
+    """
+    rows = half[np.argsort(x[half], kind="stable")]
+    tail = (1.0 - INTERVAL) / 2.0
+    low, middle, high = np.quantile(draws[:, rows], [tail, 0.5, 1.0 - tail], axis=0)
+    band = Band(
+        label=name,
+        x=x[rows],
+        low=low,
+        high=high,
+        colour=colour,
+        opacity=max(0.35 / np.sqrt(count), 0.08),
+    )
+    return band, Line(label=name, x=x[rows], y=middle, colour=colour, width=0.8)
+
+
+def which_chart(which: "Which") -> Chart:
+    """Return the probability of each class of effects, and of anything else."""
+    shown = [c for c in which.causes if c.probability >= _LEAST][:_MOST]
+    causes = [c for c in shown if not c.on_noise]
+    noise = [c for c in shown if c.on_noise]
+    bars, at = list[Mark](), 1.0
+    groups = (causes, BLUE), ([which.outside], ORANGE), (noise, GREY)
+    for group, colour in groups:
+        if group:
+            chances = np.array([each.probability for each in group])
+            bars.append(
+                Bars(at=at + np.arange(len(group)), high=chances, colour=colour)
+            )
+            at += len(group)
+    names = [_name(each) for each in (*causes, which.outside, *noise)]
+    return Chart(panels=[_ranked("probability that it acts", bars, names, (0.0, 1.0))])
+
+
+def _name(cause: "Cause") -> str:
+    words = either(cause.members, _NAMES) if cause.members else "outside the library"
+    if cause.explains and cause.probability > _LIKELY:
+        share = cause.explains.median
+        words += f": {'all' if share >= ALL else percent(share)} of the gap"
+    return words
+
+
+def _ranked(
+    axis: str,
+    bars: list[Mark],
+    names: list[str],
+    limits: tuple[float | None, float | None] = (None, None),
+) -> Panel:
+    """Return a panel of bars with room for long names."""
+    lines = max((len(wrap(name, 40)) for name in names), default=1)
+    return Panel(
+        x="",
+        y=axis,
+        marks=bars,
+        names=names,
+        horizontal=True,
+        y_limits=limits,
+        wide=True,
+        height=1.0 + (0.2 + 0.15 * lines) * max(len(names), 2),
+    )
+
+
+def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
+    """Return what each model leaves, from the straight model to the noise."""
+    rungs = [rung for rung in far.ladder if rung.model != FORMULA]
+    rms = np.array([rung.rms_N for rung in rungs])
+    at = np.arange(1.0, len(rms) + 1.0)
+    bars: list[Mark] = [
+        Bars(at=at[:1], high=rms[:1], colour=SKY),
+        Bars(at=at[1:-1], high=rms[1:-1], colour=BLUE),
+        Bars(at=at[-1:], high=rms[-1:], colour=GREY),
+    ]
+    axis = load_axis(units, "root mean square of what is left")
+    bars = [each for each in bars if isinstance(each, Bars) and len(each.at)]
+    return Chart(panels=[_ranked(axis, bars, [rung.model for rung in rungs])])

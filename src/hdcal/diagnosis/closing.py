@@ -1,0 +1,159 @@
+"""How far the gap closes on rows that were not fitted to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from hdcal.evidence.components import Components, components
+from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.noise_models import NoiseModel
+from hdcal.evidence.parts import Part, Posterior, join, posterior
+from hdcal.evidence.row_features import half_cycle_blocks, place_in_run
+from hdcal.evidence.search import Searched
+from hdcal.evidence.selection import select
+from hdcal.physics.effects.scatter import Scatter
+from hdcal.report.item import Interval
+
+_SAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class _LeftOut:
+    """Squared errors on rows that were left out, in noise variances of a row.
+
+    Attributes:
+        rows: their number.
+        before: mean square of the base model's errors, less the noise and less the
+            variance of the prediction.
+        after: the same with the effects.
+        spread: variance of the second prediction.
+    """
+
+    rows: int
+    before: float
+    after: float
+    spread: float
+
+
+def closed_on_left_out(
+    searched: Searched,
+    noise: NoiseModel,
+    noise_sd: float,
+    names: Sequence[str],
+    rng: np.random.Generator,
+) -> tuple[Interval | None, str]:
+    """Return the share of the gap that effects close on rows they never saw.
+
+    The rows are left out block by block: half cycles, or stretches where there are few.
+    Base model and effects are fitted to the others, the shapes of the effects included.
+    The share is 1 − √(G₁/G₀), G the mean square of what is left beyond the noise.
+
+    Args:
+        searched: hypotheses of the case.
+        noise: model of the noise.
+        noise_sd: of a typical row [N].
+        names: effects that are added together.
+        rng: source of randomness.
+
+    Returns:
+        Median and interval over resampled blocks and the error of the noise sd, None
+        where no block shows a gap; and what was left out.
+    """
+    problem = searched.problem
+    effects = {name: searched.predicting.effects[name] for name in names}
+    block, word = _blocks(
+        problem, any(issubclass(e, Scatter) for e in effects.values())
+    )
+    library = components(effects, problem)
+    found = [
+        _without(problem, library, noise, noise_sd, block == index)
+        for index in range(int(block.max()) + 1)
+    ]
+    table = np.array([[one.before, one.after, one.spread] for one in found])
+    rows = np.array([one.rows for one in found], float)
+    picked = rng.multinomial(len(found), np.full(len(found), 1 / len(found)), _SAMPLES)
+    squares = picked * rows @ table / (picked @ rows)[:, None]
+    # The relative error of a noise variance that so many rows tell.
+    free = max(problem.count - problem.X.shape[1] - len(names), 1)
+    off = free / rng.chisquare(free, _SAMPLES) - 1.0
+    closed = _closed(squares[:, 0] - off, squares[:, 1] - off)
+    # With few blocks the variance of the prediction is known roughly only: the lower
+    # end does without it.
+    careful = _closed(squares[:, 0] - off, squares[:, 1] + squares[:, 2] - off)
+    if np.isfinite(closed).mean() < 0.5:
+        return None, word
+    whole = rows @ table / rows.sum()
+    middle = float(_closed(whole[0], whole[1]))
+    middle = float(np.nanmedian(closed)) if np.isnan(middle) else middle
+    low, high = np.nanquantile(careful, 0.025), np.nanquantile(closed, 0.975)
+    ends = {"lo": min(float(low), middle), "hi": max(float(high), middle)}
+    return Interval(median=middle, **ends), word
+
+
+def _closed(before, after):
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gap = np.where(before > 0.0, before, np.nan)
+        return 1.0 - np.sqrt(np.maximum(after, 0.0) / gap)
+
+
+def _blocks(
+    problem: LinearProblem, by_member: bool
+) -> tuple[Int[np.ndarray, " n"], str]:
+    """Return the block of each row, and what a block is called.
+
+    Args:
+        problem: the case.
+        by_member: whether members differ. What a whole one is like cannot be told
+            without any row of it, so that a block is a quarter of each.
+    """
+    records = problem.records
+    if by_member:
+        quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
+        return quarter.astype(int), "a quarter of each run"
+    word = "a half cycle" if "unloading" in records.known else "a stretch of rows"
+    return half_cycle_blocks(records), word
+
+
+def _without(
+    problem: LinearProblem,
+    library: Components,
+    noise: NoiseModel,
+    noise_sd: float,
+    left_out: Bool[np.ndarray, " n"],
+) -> _LeftOut:
+    """Return errors on some rows of models that were fitted without them."""
+    rest = problem.without(left_out)
+    told = noise._replace(weight=np.where(left_out, 0.0, noise.weight))
+    weight = noise.weight[left_out]
+
+    def error(parts: Sequence[Part]) -> tuple[float, float]:
+        found = posterior(rest, told, parts)
+        off = (problem.y - found.reading)[left_out] * weight / noise_sd
+        spread = _variance(found, left_out) * (weight / noise_sd) ** 2
+        return float(np.mean(off**2 - spread)) - 1.0, float(np.mean(spread))
+
+    before, _ = error([])
+    after, spread = error(_fitted(rest, library, told))
+    return _LeftOut(int(left_out.sum()), before, after, spread)
+
+
+def _variance(
+    found: Posterior, rows: Bool[np.ndarray, " n"]
+) -> Float[np.ndarray, " m"]:
+    return np.sum((found.columns[rows] @ found.factor.T) ** 2, axis=1)
+
+
+def _fitted(
+    problem: LinearProblem, library: Components, noise: NoiseModel
+) -> list[Part]:
+    """Return effects at their most probable items, one after the other."""
+    selection = select(problem, [noise], library, [], library.names)
+    parts: list[Part] = []
+    for _ in library.names:
+        found = selection.evaluate(noise, join(problem, parts))
+        gain = found.totals()
+        gain[[part.component for part in parts]] = -np.inf
+        parts.append(found.likeliest(int(np.argmax(gain))))
+    return parts

@@ -1,1 +1,0 @@
-"""Figures of a diagnosis: where, which and how far."""

@@ -1,0 +1,268 @@
+"""A diagnosis as a result: where the gap lies, which effects act, how far it closes."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import Field, InstanceOf
+
+from hdcal.data.case import Case
+from hdcal.diagnosis.charts import gap_chart, ladder_chart, which_chart
+from hdcal.diagnosis.gap import GapByRow
+from hdcal.diagnosis.next_run import NextRun
+from hdcal.diagnosis.seen import Seen
+from hdcal.diagnosis.wording import either, on_noise, share_words, together
+from hdcal.inference.model_average import LeftOut, ModelAverage
+from hdcal.inference.posterior import Posterior
+from hdcal.report.chart_spec import Chart
+from hdcal.report.item import (
+    INTERVAL,
+    Count,
+    Digest,
+    EffectName,
+    Interval,
+    Item,
+    Probability,
+    Words,
+    quantity,
+)
+from hdcal.report.result import Result
+
+# From this probability on an effect is said to act, and to be named.
+LIKELY, NAMED = 0.5, 0.9
+# Least p-value of an explanation that fits.
+ADEQUATE = 0.01
+
+VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
+
+
+class Gap(Item):
+    """Whether model and readings part, and by how much.
+
+    Attributes:
+        probability: that something acts which the base model lacks.
+        rms_N: of the gap over the rows, where there is one.
+        noise_sd_N: of a reading, beside the likeliest explanation.
+        share_of_full_scale: rms over the largest force.
+        correlation: of the noise of neighbouring readings.
+    """
+
+    probability: Probability
+    rms_N: Interval | None = quantity("size of the gap", "N")
+    noise_sd_N: float = quantity("noise of a reading", "N")
+    share_of_full_scale: float | None
+    correlation: float
+
+
+class Cause(Item):
+    """Effects that this loading cannot separate, the likeliest first.
+
+    Attributes:
+        members: their names; none of something outside the library.
+        probability: that one of them acts, alone, in a pair, or beside something else.
+        explains: share of the gap's rms that they close where they act; None of effects
+            on the noise.
+    """
+
+    members: tuple[EffectName, ...]
+    probability: Probability
+    explains: Interval | None
+
+    @property
+    def on_noise(self) -> bool:
+        """Whether they act on the noise, not on the mean reading."""
+        return any(map(on_noise, self.members))
+
+    @property
+    def merged(self) -> bool:
+        """Whether they are several."""
+        return len(self.members) > 1
+
+    @property
+    def words(self) -> str:
+        """The effects in a sentence."""
+        return either(self.members)
+
+    @property
+    def share(self) -> str:
+        """The share of the gap in a sentence; empty where none is known."""
+        return share_words(self.explains) if self.explains else ""
+
+
+class Explanation(Item):
+    """Effects that together explain the readings.
+
+    Attributes:
+        effects: none where nothing acts.
+        outside: whether they leave most of the gap to something outside the library.
+        probability: of this explanation.
+    """
+
+    effects: tuple[EffectName, ...]
+    outside: bool
+    probability: Probability
+
+    @property
+    def words(self) -> str:
+        """The explanation in a sentence."""
+        if self.outside:
+            return "something outside the library"
+        return together(self.effects) or "no gap"
+
+
+class Which(Item):
+    """Which effects cause the gap.
+
+    Attributes:
+        verdict: in a word.
+        causes: classes of effects, the most probable first.
+        outside: something outside the library.
+        set: the smallest set of explanations with 90 %.
+        effects: probability that each effect acts.
+        fits: whether the likeliest explanation fits.
+        p_value: of the check of its residuals.
+        not_testable: effects that predict nothing here, with what was not measured.
+    """
+
+    verdict: VerdictWord
+    causes: tuple[Cause, ...]
+    outside: Cause
+    set: tuple[Explanation, ...]
+    effects: dict[EffectName, Probability]
+    fits: bool
+    p_value: Probability
+    not_testable: dict[EffectName, tuple[Words, ...]]
+
+    @property
+    def acting(self) -> tuple[Cause, ...]:
+        """Classes that more probably act than not."""
+        return tuple(each for each in self.causes if each.probability > LIKELY)
+
+    @property
+    def on_mean(self) -> tuple[Cause, ...]:
+        """Acting classes on the mean reading, those that explain most first."""
+        found = [each for each in self.acting if not each.on_noise]
+        return tuple(sorted(found, key=_explained, reverse=True))
+
+    @property
+    def on_noise(self) -> tuple[Cause, ...]:
+        """Acting effects on the noise."""
+        return tuple(each for each in self.acting if each.on_noise)
+
+
+def _explained(cause: Cause) -> float:
+    return cause.explains.median if cause.explains else 0.0
+
+
+class Rung(Item):
+    """What a model leaves of the readings."""
+
+    model: Words
+    rms_N: float
+
+
+class HowFar(Item):
+    """How far the gap closes.
+
+    Attributes:
+        ladder: from the formula alone down to the noise.
+        closed: share of the gap that the acting effects close on rows that they were
+            not fitted to; None without any.
+        left_out: what was left out of each fit.
+    """
+
+    ladder: tuple[Rung, ...]
+    closed: Interval | None
+    left_out: str
+
+    @property
+    def share(self) -> str:
+        """The share of the gap that closes, in a sentence."""
+        return share_words(self.closed) if self.closed else ""
+
+
+class Refit(Item):
+    """A hypothesis that was calibrated: a group of posterior.nc."""
+
+    hypothesis: Words
+    probability: Probability
+
+
+class Data(Item):
+    """Which data they were.
+
+    Attributes:
+        name: of the case.
+        rows: that were read.
+        rows_diagnosed: of these or of means of neighbours.
+        sha256: of the source.
+        notes: from reading them.
+    """
+
+    name: str
+    rows: Count
+    rows_diagnosed: Count
+    sha256: Digest
+    notes: tuple[str, ...]
+
+
+class Diagnosis(Result):
+    """What `hdcal diagnose` answers of one case; verdict.json.
+
+    Attributes:
+        gap: whether there is one.
+        seen: what readings show whatever its cause, the clearest first.
+        which: effects that cause it.
+        how_far: it closes once they are added.
+        next_test: runs that would tell more, best first.
+        refits: calibrated models, the most probable first; none of a quick diagnosis.
+        left_out: hypotheses without a calibration of their own.
+        stiffness_N_per_mm: as read, over the calibrated models.
+        coarse_step_N: step of forces that are read coarsely; 0 where they are not.
+        library: names of the effects that were considered.
+        seed: of the random numbers.
+        versions: of the packages.
+        data: that were diagnosed.
+        case: likewise.
+        rows: gap and residual of each.
+        posteriors: the calibrated models with their probabilities.
+    """
+
+    template = "diagnosis/report.md.j2"
+    table = "effects"
+
+    format: Literal["hdcal.verdict/3"] = "hdcal.verdict/3"
+    interval: float = INTERVAL
+    gap: Gap
+    seen: tuple[Seen, ...]
+    which: Which
+    how_far: HowFar
+    next_test: tuple[NextRun, ...]
+    refits: tuple[Refit, ...]
+    left_out: LeftOut | None
+    stiffness_N_per_mm: Interval | None = quantity("stiffness as read", "N/mm")
+    coarse_step_N: float
+    library: tuple[EffectName, ...]
+    seed: Count
+    versions: dict[str, str]
+    data: Data
+    case: InstanceOf[Case] = Field(exclude=True)
+    rows: InstanceOf[GapByRow] = Field(exclude=True)
+    posteriors: dict[str, tuple[float, InstanceOf[Posterior]]] = Field(exclude=True)
+
+    @property
+    def effects(self) -> tuple[Cause, ...]:
+        """The classes of effects, and what is outside the library."""
+        return (*self.which.causes, self.which.outside)
+
+    @property
+    def average(self) -> ModelAverage | None:
+        """The calibrated models, for predictions; None of a quick diagnosis."""
+        return ModelAverage(self.posteriors, self.left_out) if self.posteriors else None
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return where the gap lies, which effects cause it and how far it closes."""
+        return {
+            "where": gap_chart(self.case, self.rows),
+            "which": which_chart(self.which),
+            "how_far": ladder_chart(self.how_far, self.units),
+        }

@@ -1,0 +1,149 @@
+"""Models of the noise: equal in all rows, growing with the force, with outliers."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.special import betaln, entr, expit
+from scipy.stats import binomtest
+
+from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
+from hdcal.inference.distributions import frozen
+
+GROWING, OUTLIERS = "heteroscedastic_noise", "outliers"
+# Prior odds of each effect on the noise, whatever acts on the mean.
+PRIOR_ODDS = 0.02
+# Noise sd of the load alone at the largest force over the noise sd without load.
+_GROWTH = 2.0 ** np.arange(-0.5, 4.0)
+# Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
+_STEPS, _RATIOS = 15, 3
+# Probability by which wild readings lie on one side by chance.
+_CHANCE = 0.01
+# Sd of normal noise over its median absolute value.
+_MEDIAN_TO_SD = 1.4826
+
+
+class NoiseModel(NamedTuple):
+    """One model of the noise.
+
+    Attributes:
+        name: of the effect on the noise; empty for equal noise.
+        weight: one over the relative noise sd of each row, shape (n,).
+        correlation: AR(1) coefficient.
+        log_prior: log prior odds, and all that does not depend on the mean reading.
+    """
+
+    name: str
+    weight: Float[np.ndarray, " n"]
+    correlation: float
+    log_prior: float
+
+
+def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
+    """Return noise that is equal in all rows, a model for each correlation."""
+    log_prior = -float(np.log(len(problem.correlations)))
+    return [
+        NoiseModel("", problem.weight, float(correlation), log_prior)
+        for correlation in problem.correlations
+    ]
+
+
+def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel]:
+    """Return noise of variance sd² + (share · force)², on a grid of the share."""
+    zero, records = float(problem.base.deformation_offset), problem.records
+    load = np.abs(np.asarray(records.deformation) - zero)
+    load = load * float(problem.base.stiffness)
+    relative = np.sqrt(1.0 + (_GROWTH[:, None] * load / load.max()) ** 2)
+    typical = np.sqrt(np.mean(relative**2, axis=1))
+    share = _GROWTH * problem.noise_sd / typical / load.max()
+    sd = float(problem.priors[f"{GROWING}.share"].numbers[-1])
+    # Prior mass of each share under a mixture of half-normals, cells a factor 2 wide.
+    z = share[:, None] / (sd * SCALES)
+    density = np.sqrt(2.0 / np.pi) * (z * np.exp(-0.5 * z**2)) @ SCALE_WEIGHTS
+    mass = np.maximum(np.log(2.0) * density, 1e-300)
+    log_prior = np.log(PRIOR_ODDS) + np.log(mass)
+    # The geometric mean stays one, so that the reference noise sd keeps its meaning.
+    mean = np.exp(np.mean(np.log(relative), axis=1, keepdims=True))
+    return [
+        NoiseModel(GROWING, weight, correlation, float(log))
+        for weight, log in zip(problem.weight * mean / relative, log_prior, strict=True)
+    ]
+
+
+class _Fit(NamedTuple):
+    """An EM fit of outliers: its bound, weights of rows, and the terms they leave.
+
+    And the errors of the rows that are wild, zero of the others [N], shape (n,).
+    """
+
+    bound: float
+    weight: Float[np.ndarray, " n"]
+    log_factor: float
+    wild: Float[np.ndarray, " n"]
+
+
+def outliers(
+    problem: LinearProblem,
+    correlation: float,
+    fitted: Callable[[np.ndarray], np.ndarray],
+) -> list[NoiseModel]:
+    """Return the outlier model as weights of rows, by a variational bound.
+
+    There is none where wild rows agree with their neighbours: that is structure. The
+    probabilities that rows are wild come from an EM fit. With any such
+    probabilities the evidence of every hypothesis is a lower bound, which is tight
+    where rows are clearly wild or clearly not.
+
+    Args:
+        problem: the case.
+        correlation: of the noise; none is tried as well.
+        fitted: weights of rows → mean reading beside some hypothesis.
+    """
+    quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
+    ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
+    best = max(
+        (_fit_outliers(problem, ratio, fitted) for ratio in ratios),
+        key=lambda fit: fit.bound,
+    )
+    if _agree(best.wild, problem.before):
+        return []
+    grid = sorted({0.0, correlation})
+    log_prior = np.log(PRIOR_ODDS) + best.log_factor - np.log(_RATIOS * len(grid))
+    weight = problem.weight * best.weight
+    return [NoiseModel(OUTLIERS, weight, c, float(log_prior)) for c in grid]
+
+
+def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
+    a, b = map(float, problem.priors[f"{OUTLIERS}.fraction"].numbers)
+    count, share = len(problem.y), a / (a + b)
+    error = problem.y - fitted(np.ones(count))
+    sd = _MEDIAN_TO_SD * float(np.median(np.abs(error))) + 1e-300
+    wild, weight = np.zeros(count), np.ones(count)
+    for _ in range(_STEPS):
+        log_odds = np.log(share / (1.0 - share)) - np.log(ratio)
+        wild = expit(log_odds + 0.5 * (error / sd) ** 2 * (1.0 - ratio**-2.0))
+        weight = np.sqrt(1.0 - wild + wild / ratio**2)
+        error = problem.y - fitted(weight)
+        sd = float(np.sqrt(np.mean((weight * error) ** 2))) + 1e-300
+        share = (a + wild.sum()) / (a + b + count)
+    many = wild.sum()
+    bound = betaln(a + many, b + count - many) - betaln(a, b)
+    bound += np.sum(entr(wild) + entr(1.0 - wild)) - many * np.log(ratio)
+    log_factor = float(bound - np.sum(np.log(weight)))
+    found = np.where(wild > 0.5, error, 0.0)
+    return _Fit(float(bound - count * np.log(sd)), weight, log_factor, found)
+
+
+def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
+    """Tell whether wild rows err to the same side as wild rows before them too often.
+
+    Args:
+        wild: errors of wild rows, 0 of the others.
+        before: index of the row before each in its run, −1 for none.
+    """
+    pairs = wild * np.where(before >= 0, wild[before], 0.0)
+    same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))
+    found = all_pairs and binomtest(same, all_pairs, 0.5, "greater").pvalue < _CHANCE
+    return bool(found)

@@ -1,0 +1,183 @@
+"""Components at their most probable items, as Gaussian parts of a linear model."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import log_ndtr
+
+from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.noise_models import NoiseModel
+
+
+class Context(NamedTuple):
+    """What is taken into the base beside which items are evaluated.
+
+    Attributes:
+        offset: fixed contribution [N].
+        columns: Gaussian columns [N per sd].
+    """
+
+    offset: Float[np.ndarray, " n"]
+    columns: Float[np.ndarray, "c n"]
+
+
+class Place(NamedTuple):
+    """Where an item stands in the tables of a selection: row and column."""
+
+    row: int
+    column: int
+
+
+class Part(NamedTuple):
+    """One component at its most probable item: offset + columns · a + loose columns.
+
+    Attributes:
+        component: index of the component.
+        offset: fixed contribution [N], shape (n,).
+        columns: contribution per unit of a [N], shape (j, n).
+        mean: of a, as the item alone has it, shape (j,).
+        sd: of a, likewise.
+        loose: columns of the shape's tolerance [N per sd], shape (l, n).
+        one_sided: whether a is not negative.
+        place: of the item.
+        spread: log evidence of the component less that of the item, where it was found.
+    """
+
+    component: int
+    offset: Float[np.ndarray, " n"]
+    columns: Float[np.ndarray, "j n"]
+    mean: Float[np.ndarray, " j"]
+    sd: Float[np.ndarray, " j"]
+    loose: Float[np.ndarray, "l n"]
+    one_sided: bool
+    place: Place
+    spread: float
+
+    @property
+    def width(self) -> int:
+        """Number of Gaussian columns."""
+        return len(self.columns) + len(self.loose)
+
+    @property
+    def least(self) -> float:
+        """The coefficient of the first column at which a is zero."""
+        return -float(self.mean[0] / self.sd[0])
+
+    def context(self) -> Context:
+        """Return the part as one of the base."""
+        columns = np.concatenate([self.sd[:, None] * self.columns, self.loose])
+        return Context(self.offset + self.mean @ self.columns, columns)
+
+
+def join(problem: LinearProblem, parts: Sequence[Part]) -> Context:
+    """Return several parts as one context."""
+    contexts = [part.context() for part in parts]
+    none = np.zeros((0, len(problem.y)))
+    return Context(
+        np.sum([none.sum(axis=0), *(each.offset for each in contexts)], axis=0),
+        np.concatenate([none, *(each.columns for each in contexts)]),
+    )
+
+
+class Posterior(NamedTuple):
+    """Gaussian posterior of the coefficients of base and parts, in prior sds.
+
+    Attributes:
+        mean: shape (p,).
+        factor: F with covariance F'F, shape (p, p).
+        columns: of the coefficients, base first, shape (n, p).
+        offset: fixed contribution of the parts [N], shape (n,).
+    """
+
+    mean: Float[np.ndarray, " p"]
+    factor: Float[np.ndarray, "p p"]
+    columns: Float[np.ndarray, "n p"]
+    offset: Float[np.ndarray, " n"]
+
+    @property
+    def reading(self) -> Float[np.ndarray, " n"]:
+        """Posterior mean of the reading less the prior mean of the base [N]."""
+        return self.columns @ self.mean + self.offset
+
+
+def posterior(
+    problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
+) -> Posterior:
+    """Return the posterior of base and parts at the reference noise sd."""
+    offset, columns = join(problem, parts)
+    columns = np.concatenate([problem.X.T, columns])
+    both = np.concatenate([columns, (problem.y - offset)[None]])
+    white = problem.whiten(both, noise.weight, noise.correlation) / problem.noise_sd
+    precision = white[:-1] @ white[:-1].T + np.eye(len(columns))
+    factor = np.linalg.inv(np.linalg.cholesky(precision))
+    mean = factor.T @ (factor @ (white[:-1] @ white[-1]))
+    return Posterior(mean, factor, columns.T, offset)
+
+
+def coefficients(problem: LinearProblem, parts: Sequence[Part]) -> list[slice]:
+    """Return the place of each part's coefficients in the posterior."""
+    ends = problem.X.shape[1] + np.cumsum([0, *(part.width for part in parts)])
+    return [slice(start, stop) for start, stop in pairwise(ends)]
+
+
+def log_sign_probability(
+    problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
+) -> float:
+    """Return the log probability that one-sided amplitudes are not negative.
+
+    Parts of a context are Gaussian without bounds. The change of this probability by
+    another component restores the bounds.
+    """
+    found, total = posterior(problem, noise, parts), 0.0
+    for part, place in zip(parts, coefficients(problem, parts), strict=True):
+        if part.one_sided:
+            sd = np.linalg.norm(found.factor[:, place.start])
+            total += float(log_ndtr((found.mean[place.start] - part.least) / sd))
+    return total
+
+
+def sampled_curves(
+    problem: LinearProblem,
+    noise: NoiseModel,
+    parts: Sequence[Part],
+    count: int,
+    rng: np.random.Generator,
+) -> Float[np.ndarray, "k d n"]:
+    """Return posterior draws of what the base model leaves of each part.
+
+    Rows are weighted by their noise.
+
+    Args:
+        problem: the case.
+        noise: model of the noise.
+        parts: of one hypothesis.
+        count: number of draws.
+        rng: source of randomness.
+    """
+    found = posterior(problem, noise, parts)
+    normal = rng.standard_normal((count, len(found.mean)))
+    draws, curves = found.mean + normal @ found.factor, []
+    for part, place in zip(parts, coefficients(problem, parts), strict=True):
+        values = draws[:, place]
+        if part.one_sided:
+            values[:, 0] = np.maximum(values[:, 0], part.least)
+        curves.append(part.context().offset + values @ found.columns[:, place].T)
+    return problem.project(np.stack(curves)) * noise.weight
+
+
+def mean_curves(
+    problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
+) -> Float[np.ndarray, "k n"]:
+    """Return what the base model leaves of each part at its posterior mean.
+
+    Rows are weighted by their stated noise.
+    """
+    found = posterior(problem, noise, parts)
+    curves = [
+        part.context().offset + found.columns[:, place] @ found.mean[place]
+        for part, place in zip(parts, coefficients(problem, parts), strict=True)
+    ]
+    return problem.project(np.stack(curves)) * problem.weight

@@ -1,0 +1,277 @@
+"""The search over hypotheses: alone, beside the likeliest, pairs beside a remainder.
+
+Everything is evaluated alone under every model of the noise. Then the most probable
+components become contexts, one after the other, beside which everything is evaluated
+again, and the best pairs are refined and looked at beside a remainder.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.evidence.coarse_reading import coarse_step, with_coarse_step
+from hdcal.evidence.components import Space, components
+from hdcal.evidence.covariates import Predicting, half_cycle_rows, predicting
+from hdcal.evidence.evaluation import Evaluated, Selection
+from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
+from hdcal.evidence.linear_problem import Expansion, LinearProblem, linear_problem
+from hdcal.evidence.local_structure import likeliest_members, local_families
+from hdcal.evidence.noise_models import (
+    GROWING,
+    OUTLIERS,
+    NoiseModel,
+    equal_noise,
+    growing_noise,
+    outliers,
+)
+from hdcal.evidence.parts import Part, join, log_sign_probability, posterior
+from hdcal.evidence.remainder import kernels
+from hdcal.evidence.selection import select
+from hdcal.evidence.table import OUTSIDE, Names, Table
+from hdcal.physics.effect import Effect
+
+# Components beside which others are looked for; models of the noise used there, and
+# their least probability.
+_CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
+# Log evidence below the best beside a context from which on a hypothesis is left out.
+_HOPELESS = 25.0
+# Pairs that are refined, times, and looked at beside a remainder.
+_REFINED, _TIMES = 3, 2
+# Changes of stiffness and log noise sd from which on effects are evaluated again.
+_SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
+# Of oversampled rows one in three is kept, while so many are left, in all and of a half
+# cycle.
+_STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
+# Kernels and local families that share the prior of the remainder, at least.
+_LEAST_SHARING = 15
+
+
+@dataclass(frozen=True)
+class Searched:
+    """All hypotheses of a case, and what they were computed from.
+
+    Attributes:
+        problem: the linear problem.
+        table: evidence of each hypothesis.
+        predicting: effects of the library by what the rows tell about them.
+        selection: the components that were compared.
+        kernels: columns of each kernel of the remainder [N], shape (j, n).
+        coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
+    """
+
+    problem: LinearProblem
+    table: Table
+    predicting: Predicting
+    selection: Selection
+    kernels: list[np.ndarray]
+    coarse_step: float
+
+
+def search(
+    case: Case, library: Mapping[str, type[Effect]], *, free_runs: bool = False
+) -> Searched:
+    """Return the evidence of all hypotheses of a case.
+
+    Args:
+        case: gear and records.
+        library: effects to consider, by name.
+        free_runs: whether each run has an unknown force offset, whatever acts.
+
+    Raises:
+        InputError: an effect has no prior.
+    """
+    case, _ = average_rows(with_coarse_step(case), MOST_ROWS)
+    problem = linear_problem(case, library, free_runs=free_runs)
+    found = _Search(problem, library)
+    found.alone(range(len(problem.correlations)))
+    if _oversampled(problem, found.table):
+        return search(thin_rows(case, _STEP), library, free_runs=free_runs)
+    about = _expansion(problem, found.table)
+    if about is not None:
+        problem = linear_problem(case, library, about, free_runs=free_runs)
+        found = _Search(problem, library, found.kernels)
+        found.alone(range(len(problem.correlations)))
+    step = coarse_step(case, problem.noise_sd)
+    # The noise of a coarse reading is not normal; no effect need explain that.
+    if not step:
+        found.other_noises(library)
+    found.pairs()
+    return Searched(
+        problem=problem,
+        table=found.table,
+        predicting=found.predicting,
+        selection=found.selection,
+        kernels=[space.columns for space in found.kernels],
+        coarse_step=step,
+    )
+
+
+def _oversampled(problem: LinearProblem, table: Table) -> bool:
+    """Return whether noise is correlated as far as the grid reaches, in many rows."""
+    if int(np.argmax(table.noise_probabilities())) < len(problem.correlations) - 1:
+        return False
+    enough = len(problem.y) >= _STEP * _FEWEST
+    return enough and half_cycle_rows(problem.records) >= _STEP * _FEWEST_OF_HALF
+
+
+def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
+    """Return the point of expansion beside the best hypothesis, where it differs."""
+    parts = table.parts[table.ranked()[0]]
+    found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
+    # The first coefficient is the deviation of the log stiffness from its prior mean.
+    deviation = problem.log_shift + problem.log_sd * found.mean[0]
+    # Of the base model the rows at one temperature determine all but one parameter.
+    used = problem.X.shape[1] - 1 + sum(len(part.columns) for part in parts)
+    free = len(problem.y) - used
+    if free < 1:
+        return None
+    noise_sd = float(np.sqrt(np.sum((problem.y - found.reading) ** 2) / free))
+    moved = abs(deviation) > _SAME_STIFFNESS
+    louder = abs(np.log(noise_sd / problem.noise_sd)) > _SAME_NOISE
+    if deviation <= -1.0 or not (moved or louder):
+        return None
+    return Expansion(noise_sd, float(problem.base.stiffness) * (1.0 + deviation))
+
+
+class _Search:
+    """Fills the table of one linear problem."""
+
+    def __init__(
+        self,
+        problem: LinearProblem,
+        library: Mapping[str, type[Effect]],
+        known_kernels: list[Space] | None = None,
+    ):
+        self.problem, self.predicting = problem, predicting(library, problem.records)
+        effects = components(self.predicting.effects, problem)
+        self.outside = len(effects.names)
+        self.families = local_families(problem)
+        self.kernels = (
+            kernels(problem, effects, self.outside)
+            if known_kernels is None
+            else known_kernels
+        )
+        sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
+        self.log_sharing = float(np.log(sharing))
+        self.table = Table((*effects.names, OUTSIDE), equal_noise(problem))
+        self.selection = select(
+            problem,
+            self.table.noises,
+            effects,
+            self._sharing(self.kernels),
+            self.table.names,
+        )
+        self.found_alone: dict[int, Evaluated] = {}
+
+    def _sharing(self, spaces: Sequence[Space]) -> list[Space]:
+        """Return spaces of the remainder, among which its prior is shared."""
+        return [
+            space._replace(log_weight=space.log_weight - self.log_sharing)
+            for space in spaces
+        ]
+
+    def evaluate(
+        self, columns: Sequence[int], parts: Sequence[Part]
+    ) -> dict[int, Evaluated]:
+        """Evaluate everything beside some parts under several models of the noise."""
+        context = join(self.problem, parts)
+        beside = self.problem.with_columns(context.offset, context.columns)
+        local = likeliest_members(beside, self.families, self.outside)
+        local = self._sharing(local)
+        return {
+            column: self.selection.evaluate(self.table.noises[column], context, local)
+            for column in columns
+        }
+
+    def alone(self, columns: Sequence[int]) -> None:
+        """Enter none and each component alone."""
+        table = self.table
+        for column, found in self.evaluate(columns, []).items():
+            self.found_alone[column] = found
+            table.put((), column, found.none, list)
+            for k, value in enumerate(found.totals()):
+                if np.isfinite(value):
+                    table.put(
+                        (table.names[k],),
+                        column,
+                        float(value),
+                        lambda k=k, found=found: [found.likeliest(k)],
+                    )
+
+    def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
+        """Enter everything alone under the library's models of the noise."""
+        table, problem = self.table, self.problem
+        likeliest = int(np.argmax(table.noise_probabilities()))
+        correlation = float(problem.correlations[likeliest])
+        more = growing_noise(problem, correlation) if GROWING in library else []
+        if OUTLIERS in library:
+            for key in {(), table.ranked()[0]}:
+                parts = table.parts[key]
+
+                def fitted(weight, parts=parts):
+                    equal = NoiseModel("", weight, 0.0, 0.0)
+                    return posterior(problem, equal, parts).reading
+
+                more += outliers(problem, correlation, fitted)
+        count = len(table.noises)
+        table.add_noises(more)
+        self.alone(range(count, len(table.noises)))
+
+    def pairs(self) -> None:
+        """Enter pairs, and components and pairs beside a remainder."""
+        table = self.table
+        chance = table.noise_probabilities()
+        columns = [
+            int(column)
+            for column in np.argsort(-chance)[:_MOST_NOISES]
+            if chance[column] >= _LEAST_NOISE
+        ]
+        leading = table.ranked(1)[:_CONTEXTS]
+        if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
+            leading[-1] = (OUTSIDE,)
+        for key in leading:
+            self._beside(table.parts[key], columns)
+        for _ in range(_TIMES):
+            for key in table.ranked(2)[:_REFINED]:
+                self._refine(key, columns[:1])
+        for key in table.ranked(2)[:_REFINED]:
+            if OUTSIDE not in key:
+                self._beside(table.parts[key], columns, {self.outside})
+
+    def _refine(self, key: Names, columns: Sequence[int]) -> None:
+        """Evaluate each member of a pair beside the best item of the other one."""
+        members = {self.table.names.index(name) for name in key}
+        for part in [*self.table.parts[key]]:
+            if part.component != self.outside:
+                self._beside([part], columns, members - {part.component})
+
+    def _beside(
+        self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
+    ) -> None:
+        """Enter everything beside some parts.
+
+        Args:
+            parts: one component, or a pair whose evidence is in the table.
+            columns: indices of the models of the noise.
+            only: the components to enter; by default all.
+        """
+        table, problem = self.table, self.problem
+        key = tuple(sorted(table.names[part.component] for part in parts))
+        for column, found in self.evaluate(columns, parts).items():
+            noise = table.noises[column]
+            signs = log_sign_probability(problem, noise, parts)
+            gain = found.totals() - found.none
+            start = table.log_evidence[key][column]
+            if len(parts) == 1:
+                start = self.found_alone[column].of_part(parts[0])
+            for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
+                names = (*key, table.names[k])
+                many = len(names) - (OUTSIDE in names) > 2
+                if table.names[k] in key or many or (only and k not in only):
+                    continue
+                both = [*parts, found.likeliest(int(k))]
+                change = log_sign_probability(problem, noise, both) - signs
+                value = float(start + gain[k] + min(change, 0.0))
+                table.put(names, column, value, lambda both=both: both)

@@ -1,0 +1,104 @@
+"""All hypotheses of a case with their prior and their evidence."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.evidence.noise_models import NoiseModel
+from hdcal.evidence.parts import Part
+
+OUTSIDE = "outside"
+# Names of the components of a hypothesis on the mean reading, sorted; () is none.
+Names = tuple[str, ...]
+# Prior probabilities of none, of the remainder alone, of all effects beside it, of all
+# pairs, and of all pairs beside it. Single effects share what is left.
+_NONE, _REMAINDER, _BESIDE, _PAIRS, _PAIRS_BESIDE = 0.5, 0.1, 0.15, 0.03, 0.01
+_SINGLE = 1.0 - (_NONE + _REMAINDER + _BESIDE + _PAIRS + _PAIRS_BESIDE)
+
+
+@dataclass
+class Table:
+    """Log evidence of hypotheses on the mean reading, by model of the noise.
+
+    Attributes:
+        names: of the components on the mean reading, the remainder last.
+        noises: models of the noise; the evidences contain their priors.
+        log_evidence: of each hypothesis, shape (noises,).
+        parts: the components of each at their most probable items.
+    """
+
+    names: tuple[str, ...]
+    noises: list[NoiseModel]
+    log_evidence: dict[Names, Float[np.ndarray, " m"]] = field(default_factory=dict)
+    parts: dict[Names, list[Part]] = field(default_factory=dict)
+
+    def log_prior(self, key: Names) -> float:
+        """Return the log prior probability of a hypothesis on the mean reading."""
+        effects = max(len(self.names) - 1, 1)
+        pairs = max(effects * (effects - 1) // 2, 1)
+        alone = (_NONE, _SINGLE / effects, _PAIRS / pairs)
+        beside = (_REMAINDER, _BESIDE / effects, _PAIRS_BESIDE / pairs)
+        shares = beside if OUTSIDE in key else alone
+        return float(np.log(shares[len(key) - (OUTSIDE in key)]))
+
+    def posterior(self, temperature: float = 1.0) -> dict[Names, np.ndarray]:
+        """Return the probability of each hypothesis and model of the noise.
+
+        Args:
+            temperature: by which log posterior odds of hypotheses are divided.
+        """
+        joint = np.stack(
+            [row + self.log_prior(key) for key, row in self.log_evidence.items()]
+        )
+        whole = np.logaddexp.reduce(joint, axis=1, keepdims=True)
+        joint = np.exp((whole - whole.max()) / temperature + joint - whole)
+        return dict(zip(self.log_evidence, joint / joint.sum(), strict=True))
+
+    def ranked(self, size: int | None = None) -> list[Names]:
+        """Return hypotheses, the most probable first.
+
+        Args:
+            size: only those of so many components.
+        """
+        chance = {
+            key: float(each.sum())
+            for key, each in self.posterior().items()
+            if size in (None, len(key))
+        }
+        return sorted(chance, key=lambda key: chance[key], reverse=True)
+
+    def noise_probabilities(self) -> Float[np.ndarray, " m"]:
+        """Return the probability of each model of the noise."""
+        return np.sum([*self.posterior().values()], axis=0)
+
+    def likeliest_noise(self, key: Names) -> NoiseModel:
+        """Return the most probable model of the noise beside a hypothesis."""
+        return self.noises[int(np.argmax(self.log_evidence[key]))]
+
+    def put(
+        self, names: Names, column: int, value: float, parts: Callable[[], list[Part]]
+    ) -> None:
+        """Enter an evidence; of several lower bounds the largest counts.
+
+        Args:
+            names: of the components.
+            column: index of the model of the noise.
+            value: the log evidence.
+            parts: returns the components, where this is the largest evidence so far.
+        """
+        key = tuple(sorted(names))
+        none = np.full(len(self.noises), -np.inf)
+        row = self.log_evidence.setdefault(key, none)
+        if value > row.max():
+            self.parts[key] = parts()
+        row[column] = max(row[column], value)
+
+    def add_noises(self, noises: list[NoiseModel]) -> None:
+        """Add models of the noise, under which nothing is evaluated yet."""
+        self.noises += noises
+        none = np.full(len(noises), -np.inf)
+        self.log_evidence = {
+            key: np.append(row, none) for key, row in self.log_evidence.items()
+        }

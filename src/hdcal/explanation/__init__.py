@@ -1,1 +1,0 @@
-"""Diagnosis: where model and readings part, which effect causes it, and how far."""

@@ -1,1 +1,0 @@
-"""Marginal likelihoods of all hypotheses of a case, and the decision they support."""
