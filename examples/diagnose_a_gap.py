@@ -41,20 +41,17 @@ def main() -> None:
     case = replace(case, gear=gear, records=replace(records, force=jnp.asarray(force)))
 
     library = hdcal.EFFECTS | {WarmFriction.name: WarmFriction}
-    verdict = hdcal.diagnose(case, library=library, quick=True)
-    found = verdict.which
-    print(f"{found.verdict}: {found.effect}, beside it {found.second_effect}")
-    for name, share in sorted(found.inclusion.items(), key=lambda item: -item[1])[:4]:
-        print(f"  {name}: {share:.0%}")
-    assert found.inclusion["warm_friction"] > 0.9
+    found = hdcal.diagnose(case, library=library, quick=True)
+    print(found.headline)
+    print(found.to_frame())
+    assert found.which.effects["warm_friction"] > 0.9
 
     # A prior for an effect that is not in the library would be refused.
     without = hdcal.diagnose(
         replace(case, gear=replace(gear, effect_priors={})), quick=True
     )
-    assert "warm_friction" not in without.which.inclusion
-    assert without.which.verdict == "unknown"
-    print("without it in the library the cause is called unknown")
+    assert "warm_friction" not in without.which.effects
+    print("without it in the library:", without.headline)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """A diagnosis as a result: where the gap lies, which effects act, how far it closes."""
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, InstanceOf
 
@@ -81,6 +81,10 @@ class Cause(Item):
     def words(self) -> str:
         """The effects in a sentence."""
         return either(self.members)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of a table, the names of the effects first."""
+        return {"effects": " or ".join(self.members) or "outside"} | super().columns()
 
     @property
     def share(self) -> str:
