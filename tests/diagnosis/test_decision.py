@@ -9,8 +9,8 @@ from rigs import make_records
 
 import hdcal
 from hdcal.data.case import Case
-from hdcal.diagnosis.decision import CauseClass, Decision, decide
-from hdcal.evidence.table import OUTSIDE
+from hdcal.diagnosis.decision import Decision, decide
+from hdcal.diagnosis.which import Cause
 from hdcal.physics.registry import EFFECTS
 
 PLANTED = {
@@ -21,8 +21,8 @@ PLANTED = {
 YIELD = {"plastic_yield": {"softening": 0.2, "yield_deformation": 0.35}}
 
 
-def class_of(found: Decision, name: str) -> CauseClass:
-    return next(each for each in found.classes if name in each.members)
+def class_of(found: Decision, name: str) -> Cause:
+    return next(each for each in found.which.causes if name in each.members)
 
 
 def with_wild_readings(case: Case, count: int = 9) -> Case:
@@ -42,11 +42,13 @@ def planted(request) -> tuple[str, Decision]:
 
 def test_planted_effect_acts(planted):
     name, found = planted
-    assert max(found.effects, key=lambda effect: found.effects[effect]) == name
+    assert (
+        max(found.which.effects, key=lambda effect: found.which.effects[effect]) == name
+    )
     cause = class_of(found, name)
-    assert cause.acts >= 0.9 and cause in found.acting and found.fits
-    assert cause.closed is not None and cause.closed.median > 0.9
-    assert found.credible[0].names == (name,)
+    assert cause.probability >= 0.9 and cause in found.which.acting and found.which.fits
+    assert cause.explains is not None and cause.explains.median > 0.9
+    assert found.which.set[0].effects == (name,)
 
 
 def test_probabilities_add_up(planted):
@@ -54,9 +56,9 @@ def test_probabilities_add_up(planted):
     whole = sum(each.probability for each in found.explanations)
     assert whole == pytest.approx(1.0, abs=1e-9)
     assert sum(found.hypotheses.values()) == pytest.approx(1.0, abs=1e-9)
-    held = [each.probability for each in found.credible]
+    held = [each.probability for each in found.which.set]
     assert sum(held) >= 0.9 > sum(held[:-1])
-    members = [name for each in found.classes for name in each.members]
+    members = [name for each in found.which.causes for name in each.members]
     assert len(members) == len({*members})
 
 
@@ -67,15 +69,17 @@ def test_plain_case_has_no_gap():
 
 def test_wild_readings_are_outliers():
     found = decide(with_wild_readings(simulated(rich(), seed=2)), EFFECTS)
-    assert found.effects["outliers"] > 0.9 and found.outside.acts < 0.1
-    assert found.credible[0].names == ("outliers",)
+    assert found.which.effects["outliers"] > 0.9
+    assert found.which.outside.probability < 0.1
+    assert found.which.set[0].effects == ("outliers",)
 
 
 def test_wild_readings_stand_beside_structure():
     case = simulated(rich(), {"hysteresis": PLANTED["hysteresis"]}, seed=2)
     found = decide(with_wild_readings(case), EFFECTS)
-    assert found.effects["hysteresis"] > 0.9 and found.effects["outliers"] > 0.9
-    assert found.credible[0].names == ("hysteresis", "outliers")
+    assert found.which.effects["hysteresis"] > 0.9
+    assert found.which.effects["outliers"] > 0.9
+    assert found.which.set[0].effects == ("hysteresis", "outliers")
 
 
 def test_readings_that_agree_with_their_neighbours_are_no_outliers():
@@ -84,15 +88,15 @@ def test_readings_that_agree_with_their_neighbours_are_no_outliers():
     force[70:100] += 3.0
     case = replace(case, records=replace(case.records, force=force))
     found = decide(case, EFFECTS)
-    assert found.effects["outliers"] < 0.1 and found.gap > 0.99
-    assert found.outside.acts > 0.9
+    assert found.which.effects["outliers"] < 0.1 and found.gap > 0.99
+    assert found.which.outside.probability > 0.9
 
 
 def test_ramp_does_not_separate_yield_from_saturation():
     ramp = make_records(np.linspace(0.02, 0.54, 120))
     found = decide(simulated(ramp, YIELD, seed=1), EFFECTS)
     cause = class_of(found, "plastic_yield")
-    assert cause.acts > 0.9 and "force_saturation" in cause.members
+    assert cause.probability > 0.9 and "force_saturation" in cause.members
     assert found.unexcited["plastic_yield"] == ["unloading"]
     # A cycle does: the class is another one.
     cycled = decide(simulated(rich(), YIELD, seed=1), EFFECTS)
@@ -104,8 +108,8 @@ def test_withheld_effect_is_outside(name):
     size = {"amplifier_drift": {"rate": 0.02}, "coulomb_friction": {"force": 2.0}}
     library = {n: effect for n, effect in EFFECTS.items() if n != name}
     found = decide(simulated(rich(), {name: size[name]}, seed=1), library)
-    assert found.gap > 0.99 and found.explanations[0].names == (OUTSIDE,)
-    assert not [each for each in found.classes if each.acts >= 0.9]
+    assert found.gap > 0.99 and found.explanations[0].outside
+    assert not [each for each in found.which.causes if each.probability >= 0.9]
 
 
 def test_effect_beside_a_wave_has_its_share():
@@ -115,15 +119,15 @@ def test_effect_beside_a_wave_has_its_share():
     force = np.asarray(case.records.force) + wave
     found = decide(replace(case, records=replace(case.records, force=force)), EFFECTS)
     cause = class_of(found, "hysteresis")
-    assert cause.acts > 0.9 and found.outside.acts > 0.9
-    assert cause.closed is not None and 0.3 < cause.closed.median < 0.9
+    assert cause.probability > 0.9 and found.which.outside.probability > 0.9
+    assert cause.explains is not None and 0.3 < cause.explains.median < 0.9
 
 
 def test_effects_without_their_column_predict_nothing():
     found = decide(simulated(make_records(np.linspace(0.02, 0.54, 60))), EFFECTS)
-    assert found.lacking["thermal_stiffness"] == ["temperature"]
-    assert found.lacking["ovality"] == ["angle"]
-    assert not found.lacking.keys() & found.effects.keys()
+    assert found.which.not_testable["thermal_stiffness"] == ("temperature",)
+    assert found.which.not_testable["ovality"] == ("angle",)
+    assert not found.which.not_testable.keys() & found.which.effects.keys()
 
 
 def read(scale: float = 1.0, origin: float = 0.0) -> Decision:
@@ -137,9 +141,9 @@ def read(scale: float = 1.0, origin: float = 0.0) -> Decision:
 @pytest.mark.parametrize(("scale", "origin"), [(1000.0, 0.0), (1.0, 40.0)])
 def test_scale_and_origin_of_the_force_change_little(scale, origin):
     plain, other = read(), read(scale, origin)
-    assert other.effects["hysteresis"] > 0.9
-    for name, chance in plain.effects.items():
-        assert other.effects[name] == pytest.approx(chance, abs=0.05)
+    assert other.which.effects["hysteresis"] > 0.9
+    for name, chance in plain.which.effects.items():
+        assert other.which.effects[name] == pytest.approx(chance, abs=0.05)
     ends = [each.gap_N for each in (plain, other)]
     assert ends[0] is not None and ends[1] is not None
     assert ends[1].median / scale == pytest.approx(ends[0].median, rel=0.02)
@@ -150,4 +154,4 @@ def test_coarse_reading_is_a_fact_and_no_gap():
     force = 1.5 * np.round(np.asarray(case.records.force) / 1.5)
     found = decide(replace(case, records=replace(case.records, force=force)), EFFECTS)
     assert found.coarse_step == pytest.approx(1.5)
-    assert found.gap < 0.5 and "quantisation" not in found.effects
+    assert found.gap < 0.5 and "quantisation" not in found.which.effects

@@ -21,7 +21,7 @@ def test_classes_name_three_effects_at_most_and_noise_comes_last():
     assert either(["a", "b"]) == "a or b"
     assert either(["a", "b", "c"]).count(",") == 1
     assert "3 others" in either(["a", "b", "c", "d", "e"])
-    assert together(["outliers", "hysteresis"]).endswith("outliers")
+    assert together(["outliers", "hysteresis"]).endswith("wild readings")
 
 
 def test_the_gap_is_drawn_for_each_half_cycle():

@@ -8,6 +8,7 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.charts import calibration_chart, residual_chart
 from hdcal.calibration.residual_report import ResidualShape, residual_shapes
+from hdcal.calibration.tangent import tangent_stiffness
 from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
@@ -18,7 +19,7 @@ from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.chart_spec import Chart
 from hdcal.report.draws_charts import prior_chart, rank_chart
-from hdcal.report.item import Interval, Words
+from hdcal.report.item import Interval, Item, Words, quantity
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,
     ParameterEstimate,
@@ -32,6 +33,18 @@ _SIZED = [name for name in get_args(Theory) if name != SPRING]
 _WANTED = ("unloading", "specimen", "temperature")
 
 
+class Tangent(Item):
+    """The stiffness at the end of the tested range, effects included.
+
+    Attributes:
+        at_mm: the largest tested deformation as read.
+        stiffness_N_per_mm: slope of the mean load there, on first loading.
+    """
+
+    at_mm: float = quantity("largest tested deformation", "mm")
+    stiffness_N_per_mm: Interval = quantity("stiffness there", "N/mm")
+
+
 class Calibration(PosteriorResult):
     """What `hdcal calibrate` answers; summary.json.
 
@@ -40,6 +53,7 @@ class Calibration(PosteriorResult):
         K_by_theory: from the one posterior by every theory; None of a spring.
         residuals: their shapes that noise would rarely have.
         effects: in the model.
+        tangent: stiffness at the largest tested deformation, where effects change it.
         with_gap: whether the model has a leftover discrepancy.
         specimens: of several, by label, the stiffness of each as read [N/mm].
         steps: names of what to do next, most urgent first.
@@ -57,6 +71,7 @@ class Calibration(PosteriorResult):
     )
     residuals: tuple[ResidualShape, ...]
     effects: tuple[str, ...]
+    tangent: Tangent | None
     with_gap: bool
     specimens: dict[str, Interval]
     steps: tuple[str, ...] = Field(exclude=True)
@@ -143,11 +158,18 @@ def calibration_of(posterior: Posterior) -> Calibration:
         K_by_theory=K_by_theory(posterior),
         residuals=shapes,
         effects=tuple(effect.name for effect in posterior.effects),
+        tangent=_tangent(posterior),
         with_gap=bool(posterior.settings["with_gap"]),
         specimens=_specimens(posterior),
         steps=tuple(dict.fromkeys(_steps(posterior, left))),
         left=left,
     )
+
+
+def _tangent(posterior: Posterior) -> Tangent | None:
+    if (found := tangent_stiffness(posterior)) is None:
+        return None
+    return Tangent(at_mm=found[0], stiffness_N_per_mm=found[1])
 
 
 def summarise(posterior: Posterior) -> dict:

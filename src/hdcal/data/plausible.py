@@ -29,6 +29,11 @@ class Range(NamedTuple):
     inner: bool = False
     written: tuple[float, str] | None = None
 
+    @property
+    def whole(self) -> bool:
+        """Whether it counts something: its ends are integers."""
+        return isinstance(self.low, int)
+
     def holds(self, number: float) -> bool:
         """Tell whether a number is one of this quantity; NaN is none."""
         if self.inner:
@@ -169,4 +174,7 @@ def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
             words = f"{known.shown(number)} {known.problem()}"
             unit = " and its unit" if known.unit else ""
             return [Finding(name, words, f"Check the number{unit}")]
+        if known.whole and number != int(number):
+            words = f"{known.shown(number)} is no whole number"
+            return [Finding(name, words, "Give a whole number")]
     return []

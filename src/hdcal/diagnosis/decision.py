@@ -10,58 +10,27 @@ from hdcal.data.case import Case
 from hdcal.diagnosis.acting import Acting, acting
 from hdcal.diagnosis.adequacy import adequacy_p_value
 from hdcal.diagnosis.likeness import classes
+from hdcal.diagnosis.which import (
+    ADEQUATE,
+    LIKELY,
+    NAMED,
+    Cause,
+    Explanation,
+    VerdictWord,
+    Which,
+)
 from hdcal.evidence.noise_models import GROWING, OUTLIERS
 from hdcal.evidence.search import Searched, search
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.physics.effect import Effect
+from hdcal.report.item import INTERVAL, Interval
 
 # By which log posterior odds are divided. At this value the mean log score of the
 # explanations of two learning sets of the blind check, 160 cases each, is largest.
 TEMPERATURE = 1.3
-# Probability of the credible set, and of an interval.
-_CREDIBLE, _INTERVAL = 0.9, 0.95
-# Probability from which on an effect is said to act, and least p-value of a fit.
-_LIKELY, _ADEQUATE = 0.5, 0.01
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A median with the ends of a 95 % interval."""
-
-    median: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class CauseClass:
-    """Effects that this loading cannot separate.
-
-    Attributes:
-        members: their names, the most probable first.
-        acts: probability that one of them acts, alone, in a pair or beside something
-            outside the library.
-        closed: share of the gap's rms that they close where they act; None for effects
-            on the noise and where no draws were made.
-    """
-
-    members: tuple[str, ...]
-    acts: float
-    closed: Interval | None
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """One explanation of the readings.
-
-    Attributes:
-        names: effects that act, sorted; `OUTSIDE` where these close less than half of
-            the gap; empty where nothing acts.
-        probability: of this explanation.
-    """
-
-    names: Names
-    probability: float
+# Probability of the credible set.
+_CREDIBLE = 0.9
+_ON_NOISE = (GROWING, OUTLIERS)
 
 
 @dataclass(frozen=True)
@@ -72,16 +41,10 @@ class Decision:
         gap: probability that something acts.
         gap_N: rms of what acts on the mean reading, where it does [N]; None where no
             draws were made.
-        classes: of effects that may act, the most probable first.
-        outside: something outside the library: probability that it acts, alone or
-            beside effects, and the share of the gap it closes.
+        which: what acts, and which share of the gap's rms it explains.
         explanations: all that are possible, the most probable first.
-        credible: the smallest set of explanations with 90 %.
-        effects: probability that each effect acts.
-        p_adequate: of a posterior predictive check of the likeliest hypothesis.
         hypotheses: probability of each hypothesis on the mean reading and effect on
             the noise.
-        lacking: effects without a prediction, with the columns that were not measured.
         unexcited: effects that lack a loading which would separate them from others.
         coarse_step: step of forces that are read coarsely [N], a fact of the reading
             and no hypothesis; 0 where they are not.
@@ -89,26 +52,11 @@ class Decision:
 
     gap: float
     gap_N: Interval | None
-    classes: tuple[CauseClass, ...]
-    outside: CauseClass
+    which: Which
     explanations: tuple[Explanation, ...]
-    credible: tuple[Explanation, ...]
-    effects: Mapping[str, float]
-    p_adequate: float
     hypotheses: Mapping[Names, float]
-    lacking: Mapping[str, list[str]]
     unexcited: Mapping[str, list[str]]
     coarse_step: float
-
-    @property
-    def fits(self) -> bool:
-        """Whether the likeliest hypothesis fits the readings."""
-        return self.p_adequate >= _ADEQUATE
-
-    @property
-    def acting(self) -> tuple[CauseClass, ...]:
-        """Classes that more probably act than not."""
-        return tuple(each for each in self.classes if each.acts > _LIKELY)
 
 
 def decide(
@@ -141,40 +89,84 @@ def decide_searched(
     groups = classes(searched, posterior)
     class_of = {name: group[0] for group in groups for name in group}
     found = acting(searched, posterior, class_of, rng)
-    on_noise = [
-        (name,) for name in (GROWING, OUTLIERS) if name in searched.predicting.effects
-    ]
-    causes = [_cause(members, found) for members in [*groups, *on_noise]]
+    effects = searched.predicting.effects
+    groups += [(name,) for name in _ON_NOISE if name in effects]
+    causes = [_cause(members, found) for members in groups]
+    causes.sort(key=lambda each: -each.probability)
     explanations = _explanations(found)
     likeliest = max(posterior, key=lambda key: posterior[key].sum())
-    names = [*table.names[:-1], *(name for (name,) in on_noise)]
-    chance = {each.names: each.probability for each in explanations}
+    p_value = adequacy_p_value(searched, likeliest, rng)
+    gap = 1.0 - sum(each.probability for each in explanations if each.nothing)
     return Decision(
-        gap=1.0 - chance.get((), 0.0),
+        gap=gap,
         gap_N=_interval([(each.rms, each.weight) for each in found if each.components]),
-        classes=tuple(sorted(causes, key=lambda each: -each.acts)),
-        outside=_cause((OUTSIDE,), found),
+        which=_which(searched, found, causes, explanations, gap, p_value),
         explanations=explanations,
-        credible=_credible(explanations),
-        effects={name: _cause((name,), found).acts for name in names},
-        p_adequate=adequacy_p_value(searched, likeliest, rng),
         hypotheses=_hypotheses(searched, posterior),
-        lacking=searched.predicting.lacking,
         unexcited=searched.predicting.unexcited,
         coarse_step=searched.coarse_step,
     )
 
 
-def _cause(members: tuple[str, ...], found: Sequence[Acting]) -> CauseClass:
-    """Return a class with its probability, and the share it closes."""
+def _which(
+    searched: Searched,
+    found: Sequence[Acting],
+    causes: Sequence[Cause],
+    explanations: tuple[Explanation, ...],
+    gap: float,
+    p_value: float,
+) -> Which:
+    """Return what acts in a word, in classes and in explanations."""
+    outside, fits = _cause((OUTSIDE,), found), p_value >= ADEQUATE
+    effects = searched.predicting.effects
+    names = [*searched.table.names[:-1], *(n for n in _ON_NOISE if n in effects)]
+    lacking = searched.predicting.lacking
+    return Which(
+        verdict=_verdict(causes, outside, gap, fits),
+        causes=tuple(causes),
+        outside=outside,
+        set=_credible(explanations),
+        effects={name: _cause((name,), found).probability for name in names},
+        fits=fits,
+        p_value=p_value,
+        not_testable={name: tuple(columns) for name, columns in lacking.items()},
+    )
+
+
+def _verdict(
+    causes: Sequence[Cause], outside: Cause, gap: float, fits: bool
+) -> VerdictWord:
+    """Return the answer in a word.
+
+    Args:
+        causes: classes, the most probable first.
+        outside: something outside the library.
+        gap: probability that something acts.
+        fits: whether the likeliest explanation fits.
+    """
+    if gap <= LIKELY:
+        return "none"
+    acting = [c for c in causes if c.probability > LIKELY and c.explains is not None]
+    if not acting and outside.probability > LIKELY:
+        return "unknown"
+    if not acting or acting[0].probability < NAMED or not fits:
+        return "ambiguous"
+    return "group" if acting[0].merged else "named"
+
+
+def _cause(members: tuple[str, ...], found: Sequence[Acting]) -> Cause:
+    """Return a class with its probability, and the share of the gap it explains."""
     these = [each for each in found if {*members} & {*each.components, each.noise}]
     samples = [
         (each.closed[members[0]], each.weight)
         for each in these
         if members[0] in each.closed
     ]
-    acts = min(sum(each.weight for each in these), 1.0)
-    return CauseClass(members, acts, _interval(samples))
+    return Cause(
+        members=tuple(name for name in members if name != OUTSIDE),
+        probability=min(sum(each.weight for each in these), 1.0),
+        explains=_interval(samples),
+    )
 
 
 def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
@@ -189,9 +181,9 @@ def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
     order = np.argsort(values)
     weights = weights[order] / weights.sum()
     place = np.cumsum(weights) - 0.5 * weights
-    tail = 0.5 * (1.0 - _INTERVAL)
+    tail = 0.5 * (1.0 - INTERVAL)
     low, median, high = np.interp((tail, 0.5, 1.0 - tail), place, values[order])
-    return Interval(float(median), float(low), float(high))
+    return Interval(median=float(median), lo=float(low), hi=float(high))
 
 
 def _explanations(found: Sequence[Acting]) -> tuple[Explanation, ...]:
@@ -201,7 +193,14 @@ def _explanations(found: Sequence[Acting]) -> tuple[Explanation, ...]:
         for names, share in each.explanations().items():
             chance[names] += each.weight * share
     ranked = sorted(chance, key=lambda names: (-chance[names], names))
-    return tuple(Explanation(names, chance[names]) for names in ranked)
+    return tuple(
+        Explanation(
+            effects=tuple(name for name in names if name != OUTSIDE),
+            outside=OUTSIDE in names,
+            probability=min(chance[names], 1.0),
+        )
+        for names in ranked
+    )
 
 
 def _credible(explanations: tuple[Explanation, ...]) -> tuple[Explanation, ...]:

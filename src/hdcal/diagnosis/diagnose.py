@@ -14,31 +14,22 @@ from hdcal.diagnosis.charts import FORMULA
 from hdcal.diagnosis.closing import closed_on_left_out
 from hdcal.diagnosis.decision import (
     TEMPERATURE,
-    CauseClass,
-    Decision,
     decide_searched,
 )
-from hdcal.diagnosis.decision import Interval as Found
 from hdcal.diagnosis.gap import Fitted, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
-from hdcal.diagnosis.refit import Refits, failure_reasons, refit, rows_to_calibrate
+from hdcal.diagnosis.refit import Refits, failures, refit, rows_to_calibrate
 from hdcal.diagnosis.result import (
-    ADEQUATE,
-    LIKELY,
-    NAMED,
-    Cause,
     Data,
     Diagnosis,
-    Explanation,
     Gap,
     HowFar,
     Refit,
     Rung,
-    VerdictWord,
-    Which,
 )
 from hdcal.diagnosis.seen import what_is_seen
+from hdcal.diagnosis.which import LIKELY
 from hdcal.diagnosis.wording import effect_words
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.noise_models import OUTLIERS
@@ -83,12 +74,12 @@ def diagnose(
     searched = search(case, effects)
     found = decide_searched(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
-    names = [each.members[0] for each in found.acting if each.closed is not None]
+    names = [cause.members[0] for cause in found.which.acting if cause.explains]
     fit = fitted(searched, posterior, names)
     calibrated = case if quick else rows_to_calibrate(case)
     fits = refit(calibrated, found.hypotheses, effects, seed, progress, quick=quick)
     largest = float(np.max(np.abs(case.records.force)))
-    size = _interval(found.gap_N)
+    size = found.gap_N if found.gap > LIKELY else None
     return Diagnosis(
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
@@ -100,7 +91,7 @@ def diagnose(
             correlation=fit.noise.correlation,
         ),
         seen=what_is_seen(searched.problem, case),
-        which=_which(found),
+        which=found.which,
         how_far=_how_far(case, searched, fit, names, rng),
         next_test=tuple(
             run.model_copy(update={"run": case.units.say(run.run)})
@@ -109,7 +100,7 @@ def diagnose(
         refits=_ranked(fits),
         left_out=fits.left_out,
         stiffness_N_per_mm=_stiffness(fits),
-        reasons=failure_reasons(fits),
+        reasons=() if fits.posteriors else failures(fits),
         coarse_step_N=found.coarse_step,
         library=tuple(effects),
         seed=seed,
@@ -119,7 +110,7 @@ def diagnose(
             rows=len(case.records.force),
             rows_diagnosed=len(searched.problem.y),
             sha256=case.data_sha256,
-            notes=calibrated.notes,
+            notes=(*calibrated.notes, *failures(fits)),
         ),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
@@ -156,51 +147,6 @@ def _stiffness(fits: Refits) -> Interval | None:
     if not fits.posteriors:
         return None
     return Interval.of(pool([*fits.posteriors.values()]).values["stiffness"])
-
-
-def _interval(found: Found | None) -> Interval | None:
-    return found and Interval(median=found.median, lo=found.low, hi=found.high)
-
-
-def _which(found: Decision) -> Which:
-    def cause(each: CauseClass) -> Cause:
-        members = tuple(name for name in each.members if name != OUTSIDE)
-        closed = _interval(each.closed)
-        return Cause(members=members, probability=each.acts, explains=closed)
-
-    return Which(
-        verdict=_verdict(found),
-        causes=tuple(map(cause, found.classes)),
-        outside=cause(found.outside),
-        set=tuple(
-            Explanation(
-                effects=tuple(name for name in each.names if name != OUTSIDE),
-                outside=OUTSIDE in each.names,
-                probability=each.probability,
-            )
-            for each in found.credible
-        ),
-        effects=dict(found.effects),
-        fits=found.p_adequate >= ADEQUATE,
-        p_value=found.p_adequate,
-        not_testable={n: tuple(columns) for n, columns in found.lacking.items()},
-    )
-
-
-def _verdict(found: Decision) -> VerdictWord:
-    """Return the answer in a word.
-
-    No cause is named that does not fit, and no effect on the noise.
-    """
-    if found.gap <= LIKELY:
-        return "none"
-    causes = [each for each in found.acting if each.closed is not None]
-    if not causes and found.outside.acts > LIKELY:
-        return "unknown"
-    leading = causes[0] if causes else None
-    if leading is None or leading.acts < NAMED or found.p_adequate < ADEQUATE:
-        return "ambiguous"
-    return "named" if len(leading.members) == 1 else "group"
 
 
 def _how_far(

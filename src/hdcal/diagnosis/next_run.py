@@ -109,9 +109,8 @@ def _candidates(
 
 def _differing(one: Names, two: Names) -> tuple[Names, Names]:
     """Return hypotheses without what they share, unless one lies in the other."""
-    left = tuple(name for name in one if name not in two)
-    right = tuple(name for name in two if name not in one)
-    return (left, right) if left and right else (one, two)
+    left, right = ({*one} - {*two}), ({*two} - {*one})
+    return (tuple(sorted(left)), tuple(sorted(right))) if left and right else (one, two)
 
 
 def _predicted(searched: Searched, key: Names, run: CandidateRun) -> _Predicted:

@@ -188,10 +188,8 @@ def _widest(fits: Mapping[str, Posterior]) -> str:
     return max(fits, key=lambda name: float(np.std(fits[name].draws["stiffness"])))
 
 
-def failure_reasons(fits: Refits) -> tuple[str, ...]:
-    """Say why nothing may be used: every calibration failed."""
-    if fits.posteriors:
-        return ()
+def failures(fits: Refits) -> tuple[str, ...]:
+    """Say which calibrations failed their checks, and why."""
     return tuple(
         f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
         for name, fit in fits.failed.items()

@@ -1,7 +1,7 @@
 """A diagnosis as a result: where the gap lies, which effects act, how far it closes."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, InstanceOf
 
@@ -10,7 +10,8 @@ from hdcal.diagnosis.charts import gap_chart, ladder_chart, which_chart
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.next_run import NextRun
 from hdcal.diagnosis.seen import Seen
-from hdcal.diagnosis.wording import either, on_noise, share_words, together
+from hdcal.diagnosis.which import Cause, Which
+from hdcal.diagnosis.wording import share_words
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart
@@ -26,13 +27,6 @@ from hdcal.report.item import (
     quantity,
 )
 from hdcal.report.result import Result
-
-# From this probability on an effect is said to act, and to be named.
-LIKELY, NAMED = 0.5, 0.9
-# Least p-value of an explanation that fits.
-ADEQUATE = 0.01
-
-VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
 
 
 class Gap(Item):
@@ -51,110 +45,6 @@ class Gap(Item):
     noise_sd_N: float = quantity("noise of a reading", "N")
     share_of_full_scale: float | None
     correlation: float
-
-
-class Cause(Item):
-    """Effects that this loading cannot separate, the likeliest first.
-
-    Attributes:
-        members: their names; none of something outside the library.
-        probability: that one of them acts, alone, in a pair, or beside something else.
-        explains: share of the gap's rms that they close where they act; None of effects
-            on the noise.
-    """
-
-    members: tuple[EffectName, ...]
-    probability: Probability
-    explains: Interval | None
-
-    @property
-    def on_noise(self) -> bool:
-        """Whether they act on the noise, not on the mean reading."""
-        return any(map(on_noise, self.members))
-
-    @property
-    def merged(self) -> bool:
-        """Whether they are several."""
-        return len(self.members) > 1
-
-    @property
-    def words(self) -> str:
-        """The effects in a sentence."""
-        return either(self.members)
-
-    def columns(self) -> dict[str, Any]:
-        """Return the columns of a table, the names of the effects first."""
-        return {"effects": " or ".join(self.members) or "outside"} | super().columns()
-
-    @property
-    def share(self) -> str:
-        """The share of the gap in a sentence; empty where none is known."""
-        return share_words(self.explains) if self.explains else ""
-
-
-class Explanation(Item):
-    """Effects that together explain the readings.
-
-    Attributes:
-        effects: none where nothing acts.
-        outside: whether they leave most of the gap to something outside the library.
-        probability: of this explanation.
-    """
-
-    effects: tuple[EffectName, ...]
-    outside: bool
-    probability: Probability
-
-    @property
-    def words(self) -> str:
-        """The explanation in a sentence."""
-        if self.outside:
-            return "something outside the library"
-        return together(self.effects) or "no gap"
-
-
-class Which(Item):
-    """Which effects cause the gap.
-
-    Attributes:
-        verdict: in a word.
-        causes: classes of effects, the most probable first.
-        outside: something outside the library.
-        set: the smallest set of explanations with 90 %.
-        effects: probability that each effect acts.
-        fits: whether the likeliest explanation fits.
-        p_value: of the check of its residuals.
-        not_testable: effects that predict nothing here, with what was not measured.
-    """
-
-    verdict: VerdictWord
-    causes: tuple[Cause, ...]
-    outside: Cause
-    set: tuple[Explanation, ...]
-    effects: dict[EffectName, Probability]
-    fits: bool
-    p_value: Probability
-    not_testable: dict[EffectName, tuple[Words, ...]]
-
-    @property
-    def acting(self) -> tuple[Cause, ...]:
-        """Classes that more probably act than not."""
-        return tuple(each for each in self.causes if each.probability > LIKELY)
-
-    @property
-    def on_mean(self) -> tuple[Cause, ...]:
-        """Acting classes on the mean reading, those that explain most first."""
-        found = [each for each in self.acting if not each.on_noise]
-        return tuple(sorted(found, key=_explained, reverse=True))
-
-    @property
-    def on_noise(self) -> tuple[Cause, ...]:
-        """Acting effects on the noise."""
-        return tuple(each for each in self.acting if each.on_noise)
-
-
-def _explained(cause: Cause) -> float:
-    return cause.explains.median if cause.explains else 0.0
 
 
 class Rung(Item):

@@ -8,6 +8,7 @@ from hdcal.report.words import label
 
 _WORDS = {
     GROWING: "noise that grows with the load",
+    OUTLIERS: "wild readings",
     "coulomb_friction": "Coulomb friction",
 }
 # From this share on an effect explains all of the gap, and below the other nothing
