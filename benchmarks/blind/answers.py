@@ -28,7 +28,6 @@ from benchmarks.blind.sealed_set import (
     write_hashed,
 )
 from hdcal.diagnosis.decision import decide
-from hdcal.evidence.table import OUTSIDE
 from hdcal.physics.effect import Effect
 
 Library = Mapping[str, type[Effect]]
@@ -80,19 +79,22 @@ def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
     coarse = found.coarse_step > 0.0 and COARSE in library
     plain = COARSE if coarse else NONE
 
-    def label(names: tuple[str, ...]) -> str:
-        return "+".join(names).replace(OUTSIDE, UNKNOWN) or plain
+    def names(each) -> tuple[str, ...]:
+        return (UNKNOWN,) if each.outside else each.effects or (plain,)
 
-    chances = {label(each.names): each.probability for each in found.explanations}
-    members = [label((n,)) for each in found.credible for n in each.names or ("",)]
-    inclusion = {name: found.effects.get(name, 0.0) for name in library}
+    which = found.which
+    chances = {"+".join(names(e)): e.probability for e in found.explanations}
+    members = [name for each in which.set for name in names(each)]
+    inclusion = {name: which.effects.get(name, 0.0) for name in library}
     inclusion |= {COARSE: chances.get(COARSE, 0.0)} if coarse else {}
     best = max(inclusion, key=lambda name: inclusion[name])
-    cause = next((c for c in found.classes if best in c.members), None)
-    group, acts = (cause.members, cause.acts) if cause else ((best,), inclusion[best])
+    cause = next((c for c in which.causes if best in c.members), None)
+    group, acts = (
+        (cause.members, cause.probability) if cause else ((best,), inclusion[best])
+    )
     verdict = _verdict(chances, group, acts)
     silent = verdict in (NONE, UNKNOWN)
-    size = cause.closed if cause and not silent else None
+    size = cause.explains if cause and not silent else None
     return Answer(
         case=case.name,
         verdict=verdict,
@@ -102,7 +104,7 @@ def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
         probabilities={NONE: 0.0, UNKNOWN: 0.0, **chances},
         inclusion=inclusion,
         detected=coarse or found.gap > 0.5,
-        closed=(size.median, size.low, size.high) if size else None,
+        closed=(size.median, size.lo, size.hi) if size else None,
         group_members=() if silent else group,
     )
 

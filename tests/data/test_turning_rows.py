@@ -54,12 +54,10 @@ def test_the_diagnosis_is_the_same_on_either_side():
         hdcal.diagnose(hdcal.read_case(_readings(before)), quick=True)
         for before in (True, False)
     ]
-    for verdict in found:
-        assert verdict.which.effect == "coulomb_friction"
-        assert verdict.which.inclusion["coulomb_friction"] > 0.99
-    first, second = (verdict.which.probabilities for verdict in found)
-    assert all(
-        abs(share - second.get(name, 0.0)) < 0.03 for name, share in first.items()
-    )
-    closed = [verdict.shrink.closed.median for verdict in found]
+    for each in found:
+        assert each.which.causes[0].members[0] == "coulomb_friction"
+        assert each.which.effects["coulomb_friction"] > 0.99
+    first, second = (each.which.effects for each in found)
+    assert first == pytest.approx(second, abs=0.03)
+    closed = [each.how_far.closed.median for each in found]
     assert closed[0] == pytest.approx(closed[1], abs=0.02)
