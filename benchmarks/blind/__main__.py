@@ -11,10 +11,11 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from benchmarks.blind.answers import DIAGNOSERS, answer_set
-from benchmarks.blind.cases import draw_cases, gear_file
+from benchmarks.blind.answers import answer_set
+from benchmarks.blind.cases import GEAR_TOML, draw_cases
+from benchmarks.blind.diagnosers import DIAGNOSERS
 from benchmarks.blind.measurement import sealed_measurement
-from benchmarks.blind.mixes import MIXES
+from benchmarks.blind.mixes import MIXES, RIGS
 from benchmarks.blind.opening import open_set
 from benchmarks.blind.sealed_set import GEAR, write_set
 from hdcal.errors import InputError
@@ -33,12 +34,12 @@ def _parser() -> argparse.ArgumentParser:
     make = commands.add_parser("make", help="seal cases, or a measurement")
     make.add_argument("--out", type=Path, required=True, help="set to make")
     make.add_argument("--key", type=Path, help="file with the labels [OUT.key]")
-    make.add_argument("--cases", type=int, default=400)
-    make.add_argument("--mix", choices=MIXES, default="all")
+    make.add_argument("--cases", type=int, default=310)
+    make.add_argument("--mix", choices=MIXES, default=RIGS)
     make.add_argument("--seed", type=int, help="of the draws, secret [random]")
     make.add_argument("--from", dest="table", type=Path, help="CSV to seal instead")
     make.add_argument("--gear", type=Path, help="its gear file")
-    make.add_argument("--cause", default="", help="its effects, or 'unknown'")
+    make.add_argument("--cause", default="", help="its effects, or 'outside'")
     make.add_argument("--withhold", default="", help="effects it is answered without")
     answer = commands.add_parser("answer", help="answer every case, or go on with it")
     answer.add_argument("folder", type=Path)
@@ -67,7 +68,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _make(given: argparse.Namespace) -> None:
     seed = secrets.randbits(_SEED_BITS) if given.seed is None else given.seed
     if given.table is None:
-        mix, files = given.mix, {GEAR: gear_file(given.mix).encode()}
+        mix, files = given.mix, {GEAR: GEAR_TOML.encode()}
         cases = draw_cases(mix, given.cases, seed)
         drawn = ((text.encode(), label) for text, label in cases)
     else:

@@ -1,10 +1,9 @@
 """Answers to a sealed set: made in parallel, kept one by one, then frozen."""
 
 import json
-import math
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib.metadata import version
 from multiprocessing import get_context
@@ -15,8 +14,7 @@ from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
 import hdcal
-from benchmarks.blind.label import ANSWER, NONE, UNKNOWN, Answer
-from benchmarks.blind.rivals import fit_each
+from benchmarks.blind.label import ANSWER, Answer
 from benchmarks.blind.sealed_set import (
     BlindSet,
     Hash,
@@ -27,13 +25,9 @@ from benchmarks.blind.sealed_set import (
     refusal,
     write_hashed,
 )
-from hdcal.diagnosis.decision import decide
-from hdcal.evidence.table import OUTSIDE
-from hdcal.physics.effect import Effect
 
-Library = Mapping[str, type[Effect]]
-Diagnoser = Callable[[hdcal.Case, Library], Answer]
-COARSE = "quantisation"
+# Answers a case with a library of effects by name.
+Diagnoser = Callable[[hdcal.Case, dict], Answer]
 _PACKAGES = ("jax", "jaxlib", "numpy", "numpyro", "scipy")
 OPENED = "opened.json"
 # Read by libraries when a process imports them; a value set by the user stands.
@@ -58,7 +52,6 @@ class Frozen:
         set: commitment of the set.
         made_by: hash of code, priors and versions.
         blind: whether the set was still sealed.
-        groups: group of each effect of the library.
         answers: in the order of the set.
     """
 
@@ -66,102 +59,10 @@ class Frozen:
     set: Hash
     made_by: Hash
     blind: bool
-    groups: dict[str, str]
     answers: tuple[Answer, ...]
 
 
 FROZEN = TypeAdapter(Frozen)
-
-
-def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
-    """Answer as `hdcal diagnose` decides."""
-    found = decide(case, library)
-    # That readings are coarse is a fact, and an explanation where nothing else acts.
-    coarse = found.coarse_step > 0.0 and COARSE in library
-    plain = COARSE if coarse else NONE
-
-    def label(names: tuple[str, ...]) -> str:
-        return "+".join(names).replace(OUTSIDE, UNKNOWN) or plain
-
-    chances = {label(each.names): each.probability for each in found.explanations}
-    members = [label((n,)) for each in found.credible for n in each.names or ("",)]
-    inclusion = {name: found.effects.get(name, 0.0) for name in library}
-    inclusion |= {COARSE: chances.get(COARSE, 0.0)} if coarse else {}
-    best = max(inclusion, key=lambda name: inclusion[name])
-    cause = next((c for c in found.classes if best in c.members), None)
-    group, acts = (cause.members, cause.acts) if cause else ((best,), inclusion[best])
-    verdict = _verdict(chances, group, acts)
-    silent = verdict in (NONE, UNKNOWN)
-    size = cause.closed if cause and not silent else None
-    return Answer(
-        case=case.name,
-        verdict=verdict,
-        effect=None if silent else best,
-        second_effect=None,
-        set=tuple(dict.fromkeys(members)),
-        probabilities={NONE: 0.0, UNKNOWN: 0.0, **chances},
-        inclusion=inclusion,
-        detected=coarse or found.gap > 0.5,
-        closed=(size.median, size.low, size.high) if size else None,
-        group_members=() if silent else group,
-    )
-
-
-def _verdict(chances: dict[str, float], group: tuple[str, ...], acts: float):
-    """Return the verdict of a decision; a class of one is named from 95 % on."""
-    none, outside = chances.get(NONE, 0.0), chances.get(UNKNOWN, 0.0)
-    if none >= 0.5:
-        return NONE
-    if outside >= max(acts, none):
-        return UNKNOWN
-    if acts >= 0.95 and len(group) == 1:
-        return "named"
-    return "group" if acts >= 0.9 else "ambiguous"
-
-
-def by_none(case: hdcal.Case, library: Library) -> Answer:
-    """Answer that there is no gap, whatever the data say: a floor for scores."""
-    return _certain(case, library, {NONE: 1.0})
-
-
-def by_r2(case: hdcal.Case, library: Library) -> Answer:
-    """Answer with the effect that fits best in sample."""
-    found = fit_each(case, library)
-    best = min((n for n in found if n != NONE), key=lambda name: found[name].square)
-    return _certain(case, library, {best: 1.0})
-
-
-def by_bic(case: hdcal.Case, library: Library) -> Answer:
-    """Answer with the weights of the Bayesian information criterion."""
-    found = {name: fit.bic for name, fit in fit_each(case, library).items()}
-    least = min(found.values())
-    odds = {name: math.exp(-0.5 * (bic - least)) for name, bic in found.items()}
-    total = sum(odds.values())
-    return _certain(case, library, {name: each / total for name, each in odds.items()})
-
-
-def _certain(case: hdcal.Case, library: Library, chances: dict[str, float]) -> Answer:
-    """Return the answer of a method that knows neither pairs nor the unknown."""
-    best = max(chances, key=lambda name: chances[name])
-    effect = None if best == NONE else best
-    return Answer(
-        case=case.name,
-        verdict="named" if effect else "none",
-        effect=effect,
-        second_effect=None,
-        set=(best,),
-        probabilities={**dict.fromkeys((NONE, UNKNOWN, *library), 0.0), **chances},
-        inclusion={name: chances.get(name, 0.0) for name in library},
-        detected=effect is not None,
-    )
-
-
-DIAGNOSERS: dict[str, Diagnoser] = {
-    "hdcal": by_hdcal,
-    "bic": by_bic,
-    "r2": by_r2,
-    "none": by_none,
-}
 
 
 def answer_set(
@@ -209,7 +110,6 @@ def answer_set(
         set=found.commitment,
         made_by=made_by,
         blind=not (folder / OPENED).exists(),
-        groups={name: effect.groups[0] for name, effect in hdcal.EFFECTS.items()},
         answers=tuple(answers[entry.case] for entry in found.manifest.cases),
     )
     sha256 = write_hashed(target, FROZEN, frozen)
