@@ -18,6 +18,7 @@ from benchmarks.blind.measurement import sealed_measurement
 from benchmarks.blind.mixes import MIXES, RIGS
 from benchmarks.blind.opening import open_set
 from benchmarks.blind.sealed_set import GEAR, write_set
+from benchmarks.blind.temperature import compare_temperatures
 from hdcal.errors import InputError
 
 # With fewer somebody could draw the cases of every seed and see which ones fit.
@@ -48,6 +49,10 @@ def _parser() -> argparse.ArgumentParser:
     opening = commands.add_parser("open", help="verify everything, and score")
     opening.add_argument("folder", type=Path)
     opening.add_argument("--key", type=Path, required=True)
+    fit = commands.add_parser("temperature", help="compare temperatures, once opened")
+    fit.add_argument("folder", type=Path)
+    fit.add_argument("--key", type=Path, required=True)
+    fit.add_argument("--jobs", type=int, default=1, help="processes [1]")
     return parser
 
 
@@ -55,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit code."""
     given = _parser().parse_args(arguments)
     try:
-        {"make": _make, "answer": _answer, "open": _open}[given.command](given)
+        _COMMANDS[given.command](given)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
@@ -106,6 +111,18 @@ def _answer(given: argparse.Namespace) -> None:
 
 def _open(given: argparse.Namespace) -> None:
     print(open_set(given.folder, given.key))
+
+
+def _temperature(given: argparse.Namespace) -> None:
+    print(compare_temperatures(given.folder, given.key, given.jobs))
+
+
+_COMMANDS = {
+    "make": _make,
+    "answer": _answer,
+    "open": _open,
+    "temperature": _temperature,
+}
 
 
 if __name__ == "__main__":

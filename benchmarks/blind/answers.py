@@ -100,7 +100,7 @@ def answer_set(
     with kept.open("a", encoding="utf-8") as file:
         if not file.tell():
             file.write(json.dumps(header) + "\n")
-        for answer in _completed(found, tasks, diagnose, jobs):
+        for answer in completed(found, tasks, diagnose, jobs):
             file.write(ANSWER.dump_json(answer).decode() + "\n")
             file.flush()
             answers[answer.case] = answer
@@ -154,7 +154,7 @@ def _read_kept(path: Path, header: dict[str, str]) -> dict[str, Answer]:
     return {answer.case: answer for answer in answers}
 
 
-def _completed(found: BlindSet, tasks, diagnose: Diagnoser, jobs: int):
+def completed(found: BlindSet, tasks, diagnose: Callable, jobs: int):
     """Yield answers as they are made, by processes that start afresh.
 
     Raises:
@@ -186,7 +186,7 @@ def _start() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _answer(table: Path, gear: Path, withheld, diagnose: Diagnoser) -> Answer:
+def _answer(table: Path, gear: Path, withheld, diagnose: Callable):
     library = {n: each for n, each in hdcal.EFFECTS.items() if n not in withheld}
     try:
         return diagnose(hdcal.read_case(table, gear), library)

@@ -6,26 +6,17 @@ error is the sum of n_b/n |h_b − m_b|. Scatter alone makes that positive, so i
 debiased as by Kumar, Liang and Ma (Verified uncertainty calibration, 2019): twice the
 plug-in less its mean with the scatter of a calibrated diagnoser, sum p (1 − p) / n_b²,
 added once more.
-
-A temperature divides the log odds of explanations. `temperature` is to be read on a
-learning set, as a factor on the temperature that the answers were made with: it divides
-the log odds of explanations, a diagnosis those of hypotheses, of which several may be
-one explanation. So the set is answered again with the new temperature, until it is 1
-within its interval.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from benchmarks.blind.estimates import SEED, Estimate, share
-from benchmarks.blind.scored_case import FLOOR
 
 _MOST_BINS, _LEAST_IN_BIN, _REPEATS = 10, 20, 500
-# Temperatures that are tried, in steps of 2 %.
-_TEMPERATURES = np.exp(np.linspace(-1.4, 1.4, 141))
 
 
 @dataclass(frozen=True)
@@ -101,32 +92,3 @@ def reliability(found: Statements) -> list[tuple[float, Estimate]]:
         (float(found.stated[places == b].mean()), share(found.true[places == b]))
         for b in range(places.max() + 1)
     ]
-
-
-def temperature(answers: Sequence[tuple[Mapping[str, float], str]]) -> Estimate:
-    """Return the temperature with the best mean log score, with a bootstrap interval.
-
-    Args:
-        answers: probabilities of explanations, and the true one.
-    """
-    n = len(answers)
-    if not n:
-        return Estimate(None, None, None, 0)
-    scores = np.array([_log_scores(chances, truth) for chances, truth in answers])
-    rng = np.random.default_rng(SEED)
-    counts = rng.multinomial(n, np.full(n, 1.0 / n), size=_REPEATS)
-    best = _TEMPERATURES[np.argmax(counts @ scores, axis=1)]
-    low, high = np.quantile(best, [0.025, 0.975])
-    value = float(_TEMPERATURES[np.argmax(scores.sum(axis=0))])
-    return Estimate(value, float(low), float(high), n)
-
-
-def _log_scores(chances: Mapping[str, float], truth: str) -> np.ndarray:
-    """Return the log probability of the truth at each temperature."""
-    possible = {name: chance for name, chance in chances.items() if chance > 0.0}
-    if truth not in possible:
-        return np.full(len(_TEMPERATURES), np.log(FLOOR))
-    logs = np.log([*possible.values()])[:, None] / _TEMPERATURES
-    whole = np.logaddexp.reduce(logs)
-    found = np.log(possible[truth]) / _TEMPERATURES - whole
-    return np.maximum(found, np.log(FLOOR))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import hdcal
 from benchmarks.blind.label import NONE, Answer, Cause, Quantiles
 from benchmarks.blind.rivals import fit_each
-from hdcal.diagnosis.decision import CauseClass, Interval, decide
+from hdcal.diagnosis.decision import CauseClass, Decision, Interval, decide
 from hdcal.evidence.table import Names
 from hdcal.physics.effect import Effect
 
@@ -19,7 +19,11 @@ _LEAST = 0.01
 
 def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
     """Answer as `hdcal diagnose` decides."""
-    found = decide(case, library)
+    return answer_of(case.name, decide(case, library), library)
+
+
+def answer_of(case: str, found: Decision, library: Library) -> Answer:
+    """Return what a decision says as an answer."""
     # That readings are coarse is a fact, and an explanation where nothing else acts.
     coarse = found.coarse_step > 0.0 and COARSE in library
     plain = COARSE if coarse else NONE
@@ -30,7 +34,7 @@ def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
         inclusion[COARSE] = chances.get(COARSE, 0.0)
         classes.append(Cause((COARSE,), inclusion[COARSE]))
     return Answer(
-        case=case.name,
+        case=case,
         gap=1.0 if coarse else found.gap,
         explanations=chances,
         set=tuple(_text(each.names, plain) for each in found.credible),

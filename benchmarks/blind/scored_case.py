@@ -8,6 +8,8 @@ from benchmarks.blind.label import NONE, OUTSIDE, Answer, Cause, Label
 
 # Least probability in a log score: no case may weigh more than log 1e-6 = −13.8.
 FLOOR = 1e-6
+# Probability from which on a class is said to act.
+SAID = 0.9
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,11 @@ class ScoredCase:
         """The likeliest class with an effect that acts, of no members without one."""
         found = [cause for cause in self.answer.classes if self.holds_truth(cause)]
         return max(found, key=lambda cause: cause.acts, default=Cause((), 0.0))
+
+    @property
+    def said(self) -> list[Cause]:
+        """Classes that are said to act."""
+        return [cause for cause in self.answer.classes if cause.acts >= SAID]
 
     def stated(self, level: float) -> list[tuple[float, bool]]:
         """Return classes of a probability or more: it, and whether an effect acts."""

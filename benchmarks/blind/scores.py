@@ -14,13 +14,12 @@ from benchmarks.blind.calibration import (
     Statements,
     calibration_error,
     statements,
-    temperature,
 )
 from benchmarks.blind.estimates import Estimate, mean, share
 from benchmarks.blind.label import NONE
-from benchmarks.blind.scored_case import Cases, ScoredCase
+from benchmarks.blind.scored_case import SAID, Cases, ScoredCase
 
-_SAID, _SURE, _LIKELY = 0.9, 0.99, 0.5
+_SURE, _LIKELY = 0.99, 0.5
 # Smaller statements on classes do not count for their calibration.
 _LEAST_STATED = 0.05
 # Of smaller gaps the share that an effect closes is hardly known.
@@ -35,7 +34,7 @@ class Row:
         what: in words.
         found: the score.
         target: what it should be at least and at most; None without a target.
-        unit: share, count, nat or factor.
+        unit: share, count or nat.
         within: the interval may reach the target in place of the score.
     """
 
@@ -88,14 +87,16 @@ def _causes(cases: Cases) -> Iterator[Row]:
         words = f"true effect most probable, r = {r:g}, rich loading"
         first = share(c.credit for c in rich)
         yield Row(words, first, at_least(target), within=True)
-    said = share(c.true_class.acts >= _SAID for c in known if c.at_least(1.0))
+    said = share(c.true_class.acts >= SAID for c in known if c.at_least(1.0))
     yield Row("true effect or its class said at 90 %, r ≥ 1", said, at_least(0.8))
-    for level, target in ((_SAID, 0.9), (_SURE, 0.98)):
+    for level, target in ((SAID, 0.9), (_SURE, 0.98)):
         words = f"of classes said at {100 * level:g} %, right"
         yield Row(words, right(cases, level), at_least(target))
+    sizes = [len(c.members) for case in known for c in case.said if case.at_least(1.0)]
+    yield Row("effects in a class said at 90 %, r ≥ 1", mean(sizes), None, "count")
 
 
-def right(cases: Cases, level: float = _SAID) -> Estimate:
+def right(cases: Cases, level: float = SAID) -> Estimate:
     """Return how often classes said are right, over all cases but withheld effects."""
     counted = [c for c in cases if not c.label.withheld]
     return share(true for c in counted for _, true in c.stated(level))
@@ -111,9 +112,6 @@ def _probabilities(cases: Cases) -> Iterator[Row]:
     words = "explanations in the 90 % set, r = 1"
     yield Row(words, size, at_most(1.5), "count")
     yield Row("log score of the true explanation", log_score(cases), None, "nat")
-    chances = [(c.answer.explanations, c.truth) for c in cases if c.truth is not None]
-    words = "temperature, times that in use, with the best log score"
-    yield Row(words, temperature(chances), None, "factor")
 
 
 def class_statements(cases: Cases) -> Statements:
@@ -150,11 +148,9 @@ def _incomplete_library(cases: Cases, closable: Mapping[str, float]) -> Iterator
     yield Row("… outside alone: said to act", share(whole))
     words = "… beside an effect: said to act, or the effect with its share"
     yield Row(words, share(parts))
-    said = share(c.true_class.acts >= _SAID for c in both)
+    said = share(c.true_class.acts >= SAID for c in both)
     yield Row("… beside an effect: the effect or its class said at 90 %", said)
-    wrong = share(
-        bool(c.stated(_SAID)) and not c.outside_acts for c in cases if c.withheld
-    )
+    wrong = share(bool(c.said) and not c.outside_acts for c in cases if c.withheld)
     words = "true effect withheld: another said at 90 %, nothing outside"
     yield Row(words, wrong, at_most(0.05))
 
@@ -194,7 +190,7 @@ def _sizes(cases: Cases, closable: Mapping[str, float]) -> Iterator[Row]:
 COLUMNS: dict[str, Callable[[Cases], Estimate]] = {
     "first": lambda cases: share(c.credit for c in cases if c.one_effect),
     "said at 90 %": lambda cases: share(
-        c.true_class.acts >= _SAID for c in cases if c.one_effect
+        c.true_class.acts >= SAID for c in cases if c.one_effect
     ),
     "said, right": right,
     "set holds": lambda cases: share(c.set_holds for c in cases if c.one_effect),

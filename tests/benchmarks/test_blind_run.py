@@ -9,6 +9,7 @@ from benchmarks.blind import __main__ as program
 from benchmarks.blind.answers import answer_set
 from benchmarks.blind.diagnosers import by_bic, by_hdcal, by_none, by_r2
 from benchmarks.blind.rivals import closable_share, fit_each
+from benchmarks.blind.temperature import TEMPERATURES, at_each
 from commands import XB1
 from diagnosis_cases import NOISE, rich, simulated
 from rigs import make_case
@@ -77,7 +78,10 @@ def test_a_measurement_is_sealed_under_a_name_that_tells_nothing(tmp_path, capsy
     assert program.main([*make, "--cause", "contact_onset, plastic_yield"]) == 0
     assert [path.name for path in (folder / "cases").iterdir()] == ["case.csv"]
     assert program.main(["answer", str(folder), "--by", "none"]) == 0
-    assert program.main(["open", str(folder), "--key", f"{folder}.key"]) == 0
+    key = [str(folder), "--key", f"{folder}.key"]
+    assert program.main(["temperature", *key]) == 2
+    assert "is still sealed" in capsys.readouterr().err
+    assert program.main(["open", *key]) == 0
     printed = capsys.readouterr().out
     assert "stated contact_onset or plastic_yield; none: acts: nothing" in printed
 
@@ -127,3 +131,11 @@ def test_hdcal_answers_as_it_decides():
     assert first.explains is not None and loop.gap_N is not None
     for each in (plain, loop):
         assert np.isclose(sum(each.explanations.values()), 1.0)
+
+
+def test_a_higher_temperature_is_less_sure():
+    size = {"hysteresis": {"force": 1.0, "reach": 0.1}}
+    found = at_each(simulated(rich(), size, seed=1), EFFECTS)
+    assert len(found) == len(TEMPERATURES)
+    cold, hot = (each.explanations["hysteresis"] for each in (found[0], found[-1]))
+    assert cold > hot + 0.01

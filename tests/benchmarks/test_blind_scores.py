@@ -4,16 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from benchmarks.blind.calibration import (
-    calibration_error,
-    reliability,
-    statements,
-    temperature,
-)
+from benchmarks.blind.calibration import calibration_error, reliability, statements
 from benchmarks.blind.estimates import mean, median, share
 from benchmarks.blind.label import NONE, OUTSIDE, Cause, Label
 from benchmarks.blind.scored_case import FLOOR, ScoredCase
 from benchmarks.blind.scores import mix_ups, score_rows, tables
+from benchmarks.blind.temperature import TEMPERATURES, best_temperature
 from scipy.stats import norm
 from stub_diagnosers import answer
 
@@ -84,6 +80,7 @@ def test_first_effect_set_and_classes():
         "true effect or its class said at 90 %, r ≥ 1": (1 / 3, 3),
         "of classes said at 90 %, right": (2 / 3, 3),
         "of classes said at 99 %, right": (0.0, 1),
+        "effects in a class said at 90 %, r ≥ 1": (1.5, 2),
         "90 % set holds the true effect, r ≥ 0.5": (2 / 3, 3),
         "explanations in the 90 % set, r = 1": (4 / 3, 3),
         "… beside an effect: the effect or its class said at 90 %": (1.0, 1),
@@ -152,8 +149,8 @@ def test_calibration_of_the_calibrated_and_of_the_overconfident():
 
 def test_the_temperature_of_the_overconfident():
     # Odds of 9 to 1 where 3 to 1 are right: log 9 = 2 log 3.
-    answers = [({"slack": 0.9, NONE: 0.1}, "slack")] * 300
-    answers += [({"slack": 0.9, NONE: 0.1}, NONE)] * 100
-    found = temperature(answers)
+    odds = 9.0 ** (1.0 / TEMPERATURES)
+    right, wrong = np.log(odds / (1.0 + odds)), np.log(1.0 / (1.0 + odds))
+    found = best_temperature(np.array([right] * 300 + [wrong] * 100).T)
     assert found.value == pytest.approx(2.0, rel=0.02)
     assert found.lo < 2.0 < found.hi
