@@ -8,8 +8,8 @@ from benchmarks.blind.label import NONE, OUTSIDE, Answer, Cause, Label
 
 # Least probability in a log score: no case may weigh more than log 1e-6 = −13.8.
 FLOOR = 1e-6
-# Probability from which on a class is said to act.
-SAID = 0.9
+# Probability from which on a class is stated to act.
+STATED = 0.9
 
 
 @dataclass(frozen=True)
@@ -67,11 +67,11 @@ class ScoredCase:
         return max(found, key=lambda cause: cause.acts, default=Cause((), 0.0))
 
     @property
-    def said(self) -> list[Cause]:
-        """Classes that are said to act."""
-        return [cause for cause in self.answer.classes if cause.acts >= SAID]
+    def stated(self) -> list[Cause]:
+        """Classes that are stated to act."""
+        return [cause for cause in self.answer.classes if cause.acts >= STATED]
 
-    def stated(self, level: float) -> list[tuple[float, bool]]:
+    def claims(self, level: float) -> list[tuple[float, bool]]:
         """Return classes of a probability or more: it, and whether an effect acts."""
         return [
             (cause.acts, self.holds_truth(cause))

@@ -1,6 +1,6 @@
 """The scores of a blind check: rows with targets, and tables by groups of cases.
 
-A class is said where it acts with 90 % or more, and right where one of its effects
+A class is stated where it acts with 90 % or more, and right where one of its effects
 acts.
 """
 
@@ -17,7 +17,7 @@ from benchmarks.blind.calibration import (
 )
 from benchmarks.blind.estimates import Estimate, mean, share
 from benchmarks.blind.label import NONE
-from benchmarks.blind.scored_case import SAID, Cases, ScoredCase
+from benchmarks.blind.scored_case import STATED, Cases, ScoredCase
 
 _SURE, _LIKELY = 0.99, 0.5
 # Smaller statements on classes do not count for their calibration.
@@ -87,19 +87,21 @@ def _causes(cases: Cases) -> Iterator[Row]:
         words = f"true effect most probable, r = {r:g}, rich loading"
         first = share(c.credit for c in rich)
         yield Row(words, first, at_least(target), within=True)
-    said = share(c.true_class.acts >= SAID for c in known if c.at_least(1.0))
-    yield Row("true effect or its class said at 90 %, r ≥ 1", said, at_least(0.8))
-    for level, target in ((SAID, 0.9), (_SURE, 0.98)):
-        words = f"of classes said at {100 * level:g} %, right"
+    stated = share(c.true_class.acts >= STATED for c in known if c.at_least(1.0))
+    yield Row("true effect or its class stated at 90 %, r ≥ 1", stated, at_least(0.8))
+    for level, target in ((STATED, 0.9), (_SURE, 0.98)):
+        words = f"of classes stated at {100 * level:g} %, right"
         yield Row(words, right(cases, level), at_least(target))
-    sizes = [len(c.members) for case in known for c in case.said if case.at_least(1.0)]
-    yield Row("effects in a class said at 90 %, r ≥ 1", mean(sizes), None, "count")
+    sizes = [
+        len(c.members) for case in known for c in case.stated if case.at_least(1.0)
+    ]
+    yield Row("effects in a class stated at 90 %, r ≥ 1", mean(sizes), None, "count")
 
 
-def right(cases: Cases, level: float = SAID) -> Estimate:
-    """Return how often classes said are right, over all cases but withheld effects."""
+def right(cases: Cases, level: float = STATED) -> Estimate:
+    """Return how often classes stated are right, over all cases but withheld effects."""
     counted = [c for c in cases if not c.label.withheld]
-    return share(true for c in counted for _, true in c.stated(level))
+    return share(true for c in counted for _, true in c.claims(level))
 
 
 def _probabilities(cases: Cases) -> Iterator[Row]:
@@ -120,7 +122,7 @@ def class_statements(cases: Cases) -> Statements:
         (index, chance, true)
         for index, case in enumerate(cases)
         if not case.label.withheld
-        for chance, true in case.stated(_LEAST_STATED)
+        for chance, true in case.claims(_LEAST_STATED)
     )
 
 
@@ -143,15 +145,15 @@ def _incomplete_library(cases: Cases, closable: Mapping[str, float]) -> Iterator
     both = [c for c in cases if c.label.kind == "composite"]
     whole = [c.outside_acts for c in outside]
     parts = [c.outside_acts or share_holds(c, closable) is True for c in both]
-    words = "outside the library, r ≥ 1: said to act, or the effect with its share"
+    words = "outside the library, r ≥ 1: stated to act, or the effect with its share"
     yield Row(words, share([*whole, *parts]), at_least(0.88))
-    yield Row("… outside alone: said to act", share(whole))
-    words = "… beside an effect: said to act, or the effect with its share"
+    yield Row("… outside alone: stated to act", share(whole))
+    words = "… beside an effect: stated to act, or the effect with its share"
     yield Row(words, share(parts))
-    said = share(c.true_class.acts >= SAID for c in both)
-    yield Row("… beside an effect: the effect or its class said at 90 %", said)
-    wrong = share(bool(c.said) and not c.outside_acts for c in cases if c.withheld)
-    words = "true effect withheld: another said at 90 %, nothing outside"
+    stated = share(c.true_class.acts >= STATED for c in both)
+    yield Row("… beside an effect: the effect or its class stated at 90 %", stated)
+    wrong = share(bool(c.stated) and not c.outside_acts for c in cases if c.withheld)
+    words = "true effect withheld: another stated at 90 %, nothing outside"
     yield Row(words, wrong, at_most(0.05))
 
 
@@ -159,7 +161,7 @@ def share_holds(case: ScoredCase, closable: Mapping[str, float]) -> bool | None:
     """Return whether the interval of a share holds the truth.
 
     Returns:
-        None where the true effect is not said to act, or its share is not known.
+        None where the true effect is not stated to act, or its share is not known.
     """
     cause, true = case.true_class, closable.get(case.label.case)
     if cause.acts <= _LIKELY or cause.explains is None or true is None:
@@ -189,10 +191,10 @@ def _sizes(cases: Cases, closable: Mapping[str, float]) -> Iterator[Row]:
 # Columns of the tables by groups of cases.
 COLUMNS: dict[str, Callable[[Cases], Estimate]] = {
     "first": lambda cases: share(c.credit for c in cases if c.one_effect),
-    "said at 90 %": lambda cases: share(
-        c.true_class.acts >= SAID for c in cases if c.one_effect
+    "stated at 90 %": lambda cases: share(
+        c.true_class.acts >= STATED for c in cases if c.one_effect
     ),
-    "said, right": right,
+    "stated, right": right,
     "set holds": lambda cases: share(c.set_holds for c in cases if c.one_effect),
     "in the set": lambda cases: mean(
         [len(c.answer.set) for c in cases if c.one_effect]

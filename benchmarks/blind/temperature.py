@@ -17,7 +17,7 @@ from benchmarks.blind.diagnosers import Library, answer_of
 from benchmarks.blind.estimates import RESAMPLES, SEED, Estimate
 from benchmarks.blind.label import Answer
 from benchmarks.blind.opening import shown
-from benchmarks.blind.scored_case import SAID, ScoredCase
+from benchmarks.blind.scored_case import STATED, ScoredCase
 from benchmarks.blind.scores import class_statements, log_score, right
 from benchmarks.blind.sealed_set import read_key, read_set, refusal
 from hdcal.diagnosis.decision import decide_searched
@@ -64,7 +64,7 @@ def compare_temperatures(folder: Path, key: Path, jobs: int) -> str:
     labels = read_key(found, key).labels
     tasks = found.manifest.cases
     answers = {each[0].case: each for each in completed(found, tasks, at_each, jobs)}
-    lines = ["| temperature | log score | calibration error | said, right | said |"]
+    lines = ["| temperature | log score | calibration error | stated, right | stated |"]
     lines.append("|---" * 5 + "|")
     scores: list[list[float]] = []
     for index, value in enumerate(TEMPERATURES):
@@ -74,8 +74,8 @@ def compare_temperatures(folder: Path, key: Path, jobs: int) -> str:
             f"{value:.2f}",
             shown(log_score(cases), "nat")[0],
             shown(calibration_error(class_statements(cases)))[0],
-            shown(right(cases, SAID))[0],
-            f"{right(cases, SAID).n}",
+            shown(right(cases, STATED))[0],
+            f"{right(cases, STATED).n}",
         ]
         lines.append(f"| {' | '.join(cells)} |")
     number, span = shown(best_temperature(np.array(scores)), "factor")

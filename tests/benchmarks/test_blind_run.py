@@ -54,7 +54,7 @@ def test_a_run_of_four_cases_with_an_interruption(tmp_path, monkeypatch, capsys)
     )
     scores = json.loads((folder / "result" / "scores.json").read_text())
     found = {row["what"]: row["found"] for row in scores["rows"]["stub"]}
-    wrong = found["true effect withheld: another said at 90 %, nothing outside"]
+    wrong = found["true effect withheld: another stated at 90 %, nothing outside"]
     assert (wrong["value"], wrong["n"]) == (1.0, 4)
     assert printed.strip() == (folder / "result" / "scores.md").read_text().strip()
     assert (folder / "result" / "reliability.png").stat().st_size > 1000

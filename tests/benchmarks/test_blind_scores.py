@@ -77,13 +77,13 @@ def test_first_effect_set_and_classes():
     found = rows([tie, near, far, pair])
     expected = {
         "true effect most probable, r = 1, rich loading": (0.5 / 3, 3),
-        "true effect or its class said at 90 %, r ≥ 1": (1 / 3, 3),
-        "of classes said at 90 %, right": (2 / 3, 3),
-        "of classes said at 99 %, right": (0.0, 1),
-        "effects in a class said at 90 %, r ≥ 1": (1.5, 2),
+        "true effect or its class stated at 90 %, r ≥ 1": (1 / 3, 3),
+        "of classes stated at 90 %, right": (2 / 3, 3),
+        "of classes stated at 99 %, right": (0.0, 1),
+        "effects in a class stated at 90 %, r ≥ 1": (1.5, 2),
         "90 % set holds the true effect, r ≥ 0.5": (2 / 3, 3),
         "explanations in the 90 % set, r = 1": (4 / 3, 3),
-        "… beside an effect: the effect or its class said at 90 %": (1.0, 1),
+        "… beside an effect: the effect or its class stated at 90 %": (1.0, 1),
     }
     for words, (value, n) in expected.items():
         assert found[words].found.value == pytest.approx(value), words
@@ -102,10 +102,10 @@ def test_a_score_below_its_target_is_met_where_its_interval_reaches_it():
 
 def test_an_incomplete_library():
     away = {"withheld": ("slack", "stop")}
-    said, beside = (Cause(("leak",), 0.9),), Cause((OUTSIDE,), 0.8)
+    stated, beside = (Cause(("leak",), 0.9),), Cause((OUTSIDE,), 0.8)
     cases = [
-        scored({"leak": 1.0}, classes=said, **away),
-        scored({"leak": 1.0}, classes=said, outside=beside, **away),
+        scored({"leak": 1.0}, classes=stated, **away),
+        scored({"leak": 1.0}, classes=stated, outside=beside, **away),
         scored({"leak": 1.0}, ("hum",), "outside", outside=beside),
         scored({"leak": 1.0}, ("hum",), "outside", 0.5, outside=beside),
     ]
@@ -114,14 +114,14 @@ def test_an_incomplete_library():
     other = scored({"slack": 1.0}, kind="composite", r=2.0, **share_of)
     closable = {whole.label.case: 0.45, other.label.case: 0.7}
     found = rows([*cases, whole, other], closable)
-    words = "true effect withheld: another said at 90 %, nothing outside"
+    words = "true effect withheld: another stated at 90 %, nothing outside"
     assert (found[words].found.value, found[words].found.n) == (0.5, 2)
-    words = "outside the library, r ≥ 1: said to act, or the effect with its share"
+    words = "outside the library, r ≥ 1: stated to act, or the effect with its share"
     assert (found[words].found.value, found[words].found.n) == (2 / 3, 3)
     words = "… of an effect beside something outside"
     assert (found[words].found.value, found[words].found.n) == (0.5, 2)
     # A withheld effect cannot be right, and does not count.
-    assert found["of classes said at 90 %, right"].found.n == 2
+    assert found["of classes stated at 90 %, right"].found.n == 2
 
 
 def test_the_size_of_the_gap():
