@@ -87,7 +87,8 @@ def _causes(cases: Cases) -> Iterator[Row]:
         words = f"true effect most probable, r = {r:g}, rich loading"
         first = share(c.credit for c in rich)
         yield Row(words, first, at_least(target), within=True)
-    stated = share(c.true_class.acts >= STATED for c in known if c.at_least(1.0))
+    large = [c for c in known if c.at_least(1.0)]
+    stated = share(c.true_class.acts >= STATED for c in large)
     yield Row("true effect or its class stated at 90 %, r ≥ 1", stated, at_least(0.8))
     for level, target in ((STATED, 0.9), (_SURE, 0.98)):
         words = f"of classes stated at {100 * level:g} %, right"
@@ -99,7 +100,7 @@ def _causes(cases: Cases) -> Iterator[Row]:
 
 
 def right(cases: Cases, level: float = STATED) -> Estimate:
-    """Return how often classes stated are right, over all cases but withheld effects."""
+    """Return how often stated classes are right, withheld effects left out."""
     counted = [c for c in cases if not c.label.withheld]
     return share(true for c in counted for _, true in c.claims(level))
 
