@@ -3,7 +3,8 @@ PYTHON ?= python3
 UV ?= uv
 JOBS ?= auto
 ARGS ?=
-CASES ?= 400
+CASES ?= 310
+MIX ?= rigs
 ATTACKS ?= 100000
 WORKERS ?= 2
 PART ?=
@@ -71,7 +72,7 @@ blind: | .venv/installed  ## seal CASES cases, answer them blind, open and score
 		echo "blind-check is opened already. For a new one remove or move both:"; \
 		echo "  rm -r blind-check blind-check.key"; exit 1; fi
 	@if test -e blind-check; then echo "Going on with blind-check ..."; else \
-		$(BLIND) make --cases $(CASES) --mix all --out blind-check; fi
+		$(BLIND) make --cases $(CASES) --mix $(MIX) --out blind-check; fi
 	@for name in hdcal bic r2 none; do \
 		test -e blind-check/answers-$$name.json || $(BLIND) answer \
 			blind-check --by $$name --jobs $(WORKERS) || exit $$?; done

@@ -11,12 +11,14 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from benchmarks.blind.answers import DIAGNOSERS, answer_set
-from benchmarks.blind.cases import draw_cases, gear_file
+from benchmarks.blind.answers import answer_set
+from benchmarks.blind.cases import GEAR_TOML, draw_cases
+from benchmarks.blind.diagnosers import DIAGNOSERS
 from benchmarks.blind.measurement import sealed_measurement
-from benchmarks.blind.mixes import MIXES
+from benchmarks.blind.mixes import MIXES, RIGS
 from benchmarks.blind.opening import open_set
 from benchmarks.blind.sealed_set import GEAR, write_set
+from benchmarks.blind.temperature import compare_temperatures
 from hdcal.errors import InputError
 
 # With fewer somebody could draw the cases of every seed and see which ones fit.
@@ -33,12 +35,12 @@ def _parser() -> argparse.ArgumentParser:
     make = commands.add_parser("make", help="seal cases, or a measurement")
     make.add_argument("--out", type=Path, required=True, help="set to make")
     make.add_argument("--key", type=Path, help="file with the labels [OUT.key]")
-    make.add_argument("--cases", type=int, default=400)
-    make.add_argument("--mix", choices=MIXES, default="all")
+    make.add_argument("--cases", type=int, default=310)
+    make.add_argument("--mix", choices=MIXES, default=RIGS)
     make.add_argument("--seed", type=int, help="of the draws, secret [random]")
     make.add_argument("--from", dest="table", type=Path, help="CSV to seal instead")
     make.add_argument("--gear", type=Path, help="its gear file")
-    make.add_argument("--cause", default="", help="its effects, or 'unknown'")
+    make.add_argument("--cause", default="", help="its effects, or 'outside'")
     make.add_argument("--withhold", default="", help="effects it is answered without")
     answer = commands.add_parser("answer", help="answer every case, or go on with it")
     answer.add_argument("folder", type=Path)
@@ -47,6 +49,10 @@ def _parser() -> argparse.ArgumentParser:
     opening = commands.add_parser("open", help="verify everything, and score")
     opening.add_argument("folder", type=Path)
     opening.add_argument("--key", type=Path, required=True)
+    fit = commands.add_parser("temperature", help="compare temperatures, once opened")
+    fit.add_argument("folder", type=Path)
+    fit.add_argument("--key", type=Path, required=True)
+    fit.add_argument("--jobs", type=int, default=1, help="processes [1]")
     return parser
 
 
@@ -54,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit code."""
     given = _parser().parse_args(arguments)
     try:
-        {"make": _make, "answer": _answer, "open": _open}[given.command](given)
+        _COMMANDS[given.command](given)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
@@ -67,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _make(given: argparse.Namespace) -> None:
     seed = secrets.randbits(_SEED_BITS) if given.seed is None else given.seed
     if given.table is None:
-        mix, files = given.mix, {GEAR: gear_file(given.mix).encode()}
+        mix, files = given.mix, {GEAR: GEAR_TOML.encode()}
         cases = draw_cases(mix, given.cases, seed)
         drawn = ((text.encode(), label) for text, label in cases)
     else:
@@ -105,6 +111,18 @@ def _answer(given: argparse.Namespace) -> None:
 
 def _open(given: argparse.Namespace) -> None:
     print(open_set(given.folder, given.key))
+
+
+def _temperature(given: argparse.Namespace) -> None:
+    print(compare_temperatures(given.folder, given.key, given.jobs))
+
+
+_COMMANDS = {
+    "make": _make,
+    "answer": _answer,
+    "open": _open,
+    "temperature": _temperature,
+}
 
 
 if __name__ == "__main__":

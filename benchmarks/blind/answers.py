@@ -1,10 +1,9 @@
 """Answers to a sealed set: made in parallel, kept one by one, then frozen."""
 
 import json
-import math
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib.metadata import version
 from multiprocessing import get_context
@@ -15,8 +14,7 @@ from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
 import hdcal
-from benchmarks.blind.label import ANSWER, NONE, UNKNOWN, Answer
-from benchmarks.blind.rivals import fit_each
+from benchmarks.blind.label import ANSWER, Answer
 from benchmarks.blind.sealed_set import (
     BlindSet,
     Hash,
@@ -27,12 +25,9 @@ from benchmarks.blind.sealed_set import (
     refusal,
     write_hashed,
 )
-from hdcal.diagnosis.decision import decide
-from hdcal.physics.effect import Effect
 
-Library = Mapping[str, type[Effect]]
-Diagnoser = Callable[[hdcal.Case, Library], Answer]
-COARSE = "quantisation"
+# Answers a case with a library of effects by name.
+Diagnoser = Callable[[hdcal.Case, dict], Answer]
 _PACKAGES = ("jax", "jaxlib", "numpy", "numpyro", "scipy")
 OPENED = "opened.json"
 # Read by libraries when a process imports them; a value set by the user stands.
@@ -57,7 +52,6 @@ class Frozen:
         set: commitment of the set.
         made_by: hash of code, priors and versions.
         blind: whether the set was still sealed.
-        groups: group of each effect of the library.
         answers: in the order of the set.
     """
 
@@ -65,105 +59,10 @@ class Frozen:
     set: Hash
     made_by: Hash
     blind: bool
-    groups: dict[str, str]
     answers: tuple[Answer, ...]
 
 
 FROZEN = TypeAdapter(Frozen)
-
-
-def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
-    """Answer as `hdcal diagnose` decides."""
-    found = decide(case, library)
-    # That readings are coarse is a fact, and an explanation where nothing else acts.
-    coarse = found.coarse_step > 0.0 and COARSE in library
-    plain = COARSE if coarse else NONE
-
-    def names(each) -> tuple[str, ...]:
-        return (UNKNOWN,) if each.outside else each.effects or (plain,)
-
-    which = found.which
-    chances = {"+".join(names(e)): e.probability for e in found.explanations}
-    members = [name for each in which.set for name in names(each)]
-    inclusion = {name: which.effects.get(name, 0.0) for name in library}
-    inclusion |= {COARSE: chances.get(COARSE, 0.0)} if coarse else {}
-    best = max(inclusion, key=lambda name: inclusion[name])
-    cause = next((c for c in which.causes if best in c.members), None)
-    group, acts = (
-        (cause.members, cause.probability) if cause else ((best,), inclusion[best])
-    )
-    verdict = _verdict(chances, group, acts)
-    silent = verdict in (NONE, UNKNOWN)
-    size = cause.explains if cause and not silent else None
-    return Answer(
-        case=case.name,
-        verdict=verdict,
-        effect=None if silent else best,
-        second_effect=None,
-        set=tuple(dict.fromkeys(members)),
-        probabilities={NONE: 0.0, UNKNOWN: 0.0, **chances},
-        inclusion=inclusion,
-        detected=coarse or found.gap > 0.5,
-        closed=(size.median, size.lo, size.hi) if size else None,
-        group_members=() if silent else group,
-    )
-
-
-def _verdict(chances: dict[str, float], group: tuple[str, ...], acts: float):
-    """Return the verdict of a decision; a class of one is named from 95 % on."""
-    none, outside = chances.get(NONE, 0.0), chances.get(UNKNOWN, 0.0)
-    if none >= 0.5:
-        return NONE
-    if outside >= max(acts, none):
-        return UNKNOWN
-    if acts >= 0.95 and len(group) == 1:
-        return "named"
-    return "group" if acts >= 0.9 else "ambiguous"
-
-
-def by_none(case: hdcal.Case, library: Library) -> Answer:
-    """Answer that there is no gap, whatever the data say: a floor for scores."""
-    return _certain(case, library, {NONE: 1.0})
-
-
-def by_r2(case: hdcal.Case, library: Library) -> Answer:
-    """Answer with the effect that fits best in sample."""
-    found = fit_each(case, library)
-    best = min((n for n in found if n != NONE), key=lambda name: found[name].square)
-    return _certain(case, library, {best: 1.0})
-
-
-def by_bic(case: hdcal.Case, library: Library) -> Answer:
-    """Answer with the weights of the Bayesian information criterion."""
-    found = {name: fit.bic for name, fit in fit_each(case, library).items()}
-    least = min(found.values())
-    odds = {name: math.exp(-0.5 * (bic - least)) for name, bic in found.items()}
-    total = sum(odds.values())
-    return _certain(case, library, {name: each / total for name, each in odds.items()})
-
-
-def _certain(case: hdcal.Case, library: Library, chances: dict[str, float]) -> Answer:
-    """Return the answer of a method that knows neither pairs nor the unknown."""
-    best = max(chances, key=lambda name: chances[name])
-    effect = None if best == NONE else best
-    return Answer(
-        case=case.name,
-        verdict="named" if effect else "none",
-        effect=effect,
-        second_effect=None,
-        set=(best,),
-        probabilities={**dict.fromkeys((NONE, UNKNOWN, *library), 0.0), **chances},
-        inclusion={name: chances.get(name, 0.0) for name in library},
-        detected=effect is not None,
-    )
-
-
-DIAGNOSERS: dict[str, Diagnoser] = {
-    "hdcal": by_hdcal,
-    "bic": by_bic,
-    "r2": by_r2,
-    "none": by_none,
-}
 
 
 def answer_set(
@@ -201,7 +100,7 @@ def answer_set(
     with kept.open("a", encoding="utf-8") as file:
         if not file.tell():
             file.write(json.dumps(header) + "\n")
-        for answer in _completed(found, tasks, diagnose, jobs):
+        for answer in completed(found, tasks, diagnose, jobs):
             file.write(ANSWER.dump_json(answer).decode() + "\n")
             file.flush()
             answers[answer.case] = answer
@@ -211,7 +110,6 @@ def answer_set(
         set=found.commitment,
         made_by=made_by,
         blind=not (folder / OPENED).exists(),
-        groups={name: effect.groups[0] for name, effect in hdcal.EFFECTS.items()},
         answers=tuple(answers[entry.case] for entry in found.manifest.cases),
     )
     sha256 = write_hashed(target, FROZEN, frozen)
@@ -256,7 +154,7 @@ def _read_kept(path: Path, header: dict[str, str]) -> dict[str, Answer]:
     return {answer.case: answer for answer in answers}
 
 
-def _completed(found: BlindSet, tasks, diagnose: Diagnoser, jobs: int):
+def completed(found: BlindSet, tasks, diagnose: Callable, jobs: int):
     """Yield answers as they are made, by processes that start afresh.
 
     Raises:
@@ -288,7 +186,7 @@ def _start() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _answer(table: Path, gear: Path, withheld, diagnose: Diagnoser) -> Answer:
+def _answer(table: Path, gear: Path, withheld, diagnose: Callable):
     library = {n: each for n, each in hdcal.EFFECTS.items() if n not in withheld}
     try:
         return diagnose(hdcal.read_case(table, gear), library)

@@ -8,7 +8,6 @@ import numpy as np
 from benchmarks.blind.label import Label
 from benchmarks.blind.mixes import (
     MIXES,
-    RIGS,
     TIME_CONSTANTS,
     Plan,
     draw_plans,
@@ -16,7 +15,6 @@ from benchmarks.blind.mixes import (
 )
 from benchmarks.blind.rig.history import Floats
 from benchmarks.blind.rig.loadings import (
-    AS_SIMULATED,
     LOADINGS,
     POINTS,
     Loading,
@@ -30,27 +28,17 @@ from benchmarks.blind.rig.outside import OUTSIDE
 from benchmarks.blind.rig.virtual_rig import VirtualRig, draw_noise, draw_rig
 from hdcal.errors import Finding, InputError
 
-_MEASUREMENT = """
-[measurement]
-deformation = "radial"
-reference_temperature_C = 20.0
-"""
 # Rigs of many sizes have no drawing; the material is the same.
-RIGS_TOML = f"""\
+GEAR_TOML = """\
 [gear]
 name = "blind check"
 theory = "spring"
 material = "40CrNiMoA"
-{_MEASUREMENT}"""
-# The rigs are drawn about this material and geometry.
-GEAR_TOML = f"""\
-[gear]
-name = "blind check"
-wall_thickness_mm = 0.68
-radius_mm = 40.0
-length_mm = 70.0
-material = "40CrNiMoA"
-{_MEASUREMENT}"""
+
+[measurement]
+deformation = "radial"
+reference_temperature_C = 20.0
+"""
 _TRIES = 20
 # A mechanism outside the library that calibration absorbs for the most part is a wrong
 # stiffness, not a gap: least RMS that has to be left.
@@ -78,19 +66,14 @@ def draw_cases(mix: str, count: int, seed: int) -> Iterator[tuple[str, Label]]:
         yield _case(f"case-{number:0{digits}}", plan, rng.spawn(1)[0])
 
 
-def gear_file(mix: str) -> str:
-    """Return the gear file of the cases of a mix."""
-    return RIGS_TOML if mix == RIGS else GEAR_TOML
-
-
 def _case(name: str, plan: Plan, rng: np.random.Generator) -> tuple[str, Label]:
     loading = LOADINGS[plan.loading]() if plan.points == POINTS else rich(plan.points)
     for _ in range(_TRIES):
         for _ in range(_TRIES):
             rig = draw_rig(loading.history, rng)
-            drawn = _drawn_curve(plan, rig, rng)
-            if drawn is not None:
-                return _read(name, plan, loading, rig, *drawn, rng)
+            curve = _drawn_curve(plan, rig, rng)
+            if curve is not None:
+                return _read(name, plan, loading, rig, curve, rng)
         # No plausible rig shows this at this size: take another effect instead.
         plan = other_truth(plan, rng)
     raise RuntimeError(f"the loading {loading.name} shows nothing of size {plan.r:g}")
@@ -98,33 +81,30 @@ def _case(name: str, plan: Plan, rng: np.random.Generator) -> tuple[str, Label]:
 
 def _drawn_curve(
     plan: Plan, rig: VirtualRig, rng: np.random.Generator
-) -> tuple[Floats, dict[str, float]] | None:
-    """Return what the mechanisms add [N] and their true amplitudes.
+) -> Floats | None:
+    """Return what the mechanisms add [N].
 
     Returns:
         None where this rig does not show a drawn mechanism at the size of the plan.
     """
     if plan.kind == "outside":
-        curve = _outside_curve(plan.truth[0], plan.r, rig, rng)
-        return None if curve is None else (curve, {})
+        return _outside_curve(plan.truth[0], plan.r, rig, rng)
     outside = np.zeros(len(rig.history.order))
     if plan.outside:
         r = plan.r * np.sqrt(1.0 - plan.share)
         outside = _outside_curve(plan.outside, r, rig, rng)
         if outside is None:
             return None
-    active, amplitude = [], {}
+    active = []
     for name in plan.truth:
         if name in NOISES:
             continue
-        mechanism = MECHANISMS[name]
-        sized = rig.draw_mechanism(mechanism, plan.r * np.sqrt(plan.share), rng)
+        r = plan.r * np.sqrt(plan.share)
+        sized = rig.draw_mechanism(MECHANISMS[name], r, rng)
         if sized is None:
             return None
         active.append(sized)
-        if mechanism.amplitude:
-            amplitude[mechanism.amplitude] = sized.size
-    return rig.readings(active) - rig.fault_free + outside, amplitude
+    return rig.readings(active) - rig.fault_free + outside
 
 
 def _outside_curve(
@@ -145,7 +125,6 @@ def _read(
     loading: Loading,
     rig: VirtualRig,
     curve: Floats,
-    amplitude: dict[str, float],
     rng: np.random.Generator,
 ) -> tuple[str, Label]:
     """Return the measurement file and the label of one case."""
@@ -155,23 +134,20 @@ def _read(
     for each in plan.truth:
         if each in NOISES:
             reading = reading + NOISES[each](reading, plan.r * rig.sigma, rng)
-    writing = draw_writing(rng) if plan.mix == RIGS else AS_SIMULATED
+    writing = draw_writing(rng)
     label = Label(
         case=name,
-        mix=plan.mix,
         kind=plan.kind,
         truth=plan.truth,
         program=loading.name,
         rows=len(reading),
         r=plan.r,
-        noise="ar" if plan.noise == "strong" else plan.noise,
+        noise=plan.noise,
         correlation=correlation,
         sigma=rig.sigma * writing.force,
         withheld=plan.withheld,
         clean=_rounded(clean, writing),
         curve=_rounded(rig.gap(curve), writing),
-        # Amplitudes of a rig of another scale would each need a factor.
-        amplitude={} if plan.mix == RIGS else amplitude,
         outside=plan.outside,
         share=plan.share,
     )

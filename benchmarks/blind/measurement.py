@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import hdcal
-from benchmarks.blind.label import UNKNOWN, Label
+from benchmarks.blind.label import OUTSIDE, Label
 from benchmarks.blind.sealed_set import GEAR, refusal
 from hdcal.errors import Finding, InputError
 
@@ -19,7 +19,7 @@ def sealed_measurement(
     Args:
         table: a CSV file.
         gear: its gear file.
-        cause: effects each of which would be right, or `unknown`.
+        cause: effects each of which would be right, or `outside`.
         withhold: effects that it is to be answered without.
 
     Raises:
@@ -27,13 +27,13 @@ def sealed_measurement(
     """
     truth, withheld = _names(cause), tuple(sorted(_names(withhold)))
     allowed = {*hdcal.EFFECTS} - {*withheld}
-    if truth == (UNKNOWN,):
-        truth, wrong = (UNKNOWN,), {*withheld} - {*hdcal.EFFECTS}
+    if truth == (OUTSIDE,):
+        truth, wrong = (OUTSIDE,), {*withheld} - {*hdcal.EFFECTS}
     else:
         wrong = {*truth} - allowed | {*withheld} - {*hdcal.EFFECTS}
     if wrong or not truth:
         words = f"no effect that is not withheld: {', '.join(sorted(wrong)) or 'none'}"
-        remedy = f"Give effects of the library, or the cause '{UNKNOWN}'"
+        remedy = f"Give effects of the library, or the cause '{OUTSIDE}'"
         raise InputError([Finding("cause", words, remedy)])
     case = hdcal.read_case(table, gear)
     files, material = {GEAR: gear.read_bytes()}, gear.parent / case.gear.material

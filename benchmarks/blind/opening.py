@@ -1,7 +1,7 @@
 """The opening of a sealed set: everything verified, then scored and written."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,25 +11,25 @@ from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
 import hdcal
-from benchmarks.blind.answers import OPENED, Frozen, read_frozen
+from benchmarks.blind.answers import OPENED, read_frozen
 from benchmarks.blind.calibration import reliability
 from benchmarks.blind.estimates import Estimate
+from benchmarks.blind.label import Label
 from benchmarks.blind.rivals import closable_share
 from benchmarks.blind.scored_case import Cases, ScoredCase
 from benchmarks.blind.scores import (
     COLUMNS,
+    LEAST_CLOSED_R,
+    UNITS,
     Row,
-    columns,
-    effect_statements,
+    class_statements,
     mix_ups,
     score_rows,
     tables,
-    top_statements,
 )
 from benchmarks.blind.sealed_set import (
     BlindSet,
     Hash,
-    Key,
     read_hashed,
     read_key,
     read_set,
@@ -38,8 +38,6 @@ from benchmarks.blind.sealed_set import (
 
 JUDGED = "hdcal"
 RESULT = "result"
-# Of smaller gaps the share that closes is hardly known.
-_LEAST_CLOSED_R = 0.5
 
 
 @dataclass(frozen=True)
@@ -75,16 +73,21 @@ def open_set(folder: Path, key: Path) -> str:
         name: answers.blind and first.answers.get(name) == sha
         for name, (answers, sha) in frozen.items()
     }
-    scored = {name: _scored(secret, answers) for name, (answers, _) in frozen.items()}
-    judged = JUDGED if JUDGED in scored else next(iter(scored))
-    cases = scored[judged]
-    rows = score_rows(cases, closable_shares(found, cases))
+    pairs = {
+        name: [*map(ScoredCase, secret.labels, answers.answers)]
+        for name, (answers, _) in frozen.items()
+    }
+    # hdcal first, then in alphabetical order.
+    scored = {n: pairs[n] for n in sorted(pairs, key=lambda n: (n != JUDGED, n))}
+    closable = closable_shares(found, secret.labels)
+    rows = {name: score_rows(cases, closable) for name, cases in scored.items()}
+    cases = next(iter(scored.values()))
     head = [f"commitment {found.commitment}"]
     head += [
         f"answers {sha} by '{name}'" + ("" if blind[name] else ", NOT BLIND")
         for name, (_, sha) in frozen.items()
     ]
-    text = "\n".join([*head, "", *_markdown(judged, rows, scored)]) + "\n"
+    text = "\n".join([*head, "", *_markdown(rows, scored)]) + "\n"
     result = folder / RESULT
     result.mkdir(exist_ok=True)
     (result / "scores.md").write_text(text, "utf-8")
@@ -92,10 +95,12 @@ def open_set(folder: Path, key: Path) -> str:
         "commitment": found.commitment,
         "mix": secret.mix,
         "answers": {n: {"sha256": frozen[n][1], "blind": blind[n]} for n in frozen},
-        "judged": judged,
-        "rows": [{**asdict(row), "target": _ends(row), "met": row.met} for row in rows],
-        "diagnosers": {name: columns(some) for name, some in scored.items()},
+        "rows": {
+            name: [{**asdict(r), "target": _ends(r), "met": r.met} for r in some]
+            for name, some in rows.items()
+        },
         "tables": tables(cases),
+        "reliability": reliability(class_statements(cases)),
         "mix_ups": mix_ups(cases),
     }
     plain = json.dumps(content, indent=1, default=asdict)
@@ -115,72 +120,87 @@ def _first_opening(found: BlindSet, hashes: dict[str, str]) -> Opened:
     return opened
 
 
-def _scored(secret: Key, frozen: Frozen) -> list[ScoredCase]:
-    pairs = zip(secret.labels, frozen.answers, strict=True)
-    return [ScoredCase(label, answer, frozen.groups) for label, answer in pairs]
+def closable_shares(found: BlindSet, labels: Sequence[Label]) -> dict[str, float]:
+    """Return the share of the gap's rms that the true effect can close, by case.
 
-
-def closable_shares(found: BlindSet, cases: Cases) -> dict[str, float]:
-    """Return, of cases whose effect is answered rightly, what its form can close.
-
-    The data come from other physics than the library's: even the true effect does not
-    close all of a gap.
+    As the library's effect does, fitted to the readings without noise by least squares:
+    the data come from other physics, so that even an effect that acts alone does not
+    close all of its gap. The share is defined as `Cause.explains`.
     """
     shares = {}
-    for scored, entry in zip(cases, found.manifest.cases, strict=True):
-        label, effect = scored.label, scored.answer.effect
-        if not scored.one_effect or label.r < _LEAST_CLOSED_R:
-            continue
-        if effect not in hdcal.EFFECTS or effect != label.truth[0]:
+    for label, entry in zip(labels, found.manifest.cases, strict=True):
+        known = label.kind in ("effect", "composite") and not label.withheld
+        if not known or label.r < LEAST_CLOSED_R:
             continue
         case = hdcal.read_case(found.table(entry), found.gear)
         assert case.screening is not None
         clean = np.asarray(label.clean)[case.screening.kept]
         case = replace(case, records=replace(case.records, force=clean))
-        share = closable_share(case, effect, hdcal.EFFECTS, label.sigma)
+        share = closable_share(case, label.truth[0], hdcal.EFFECTS, label.sigma)
         if share is not None:
             shares[label.case] = share
     return shares
 
 
 def _markdown(
-    judged: str, rows: list[Row], scored: Mapping[str, Cases]
+    rows: Mapping[str, list[Row]], scored: Mapping[str, Cases]
 ) -> Iterator[str]:
-    met = [row.met for row in rows]
-    yield f"{judged}: {met.count(True)} targets met, {met.count(False)} missed"
-    yield "\n| score | found | 95 % interval | cases | target | |\n" + "|---" * 6 + "|"
-    words = {True: "met", False: "**missed**", None: ""}
-    for row in rows:
-        number, span = shown(row.found, row.unit)
-        cells = row.what, number, span, str(row.found.n), _target(row), words[row.met]
+    for name, some in rows.items():
+        met = [row.met for row in some]
+        yield f"{name}: {met.count(True)} targets met, {met.count(False)} missed"
+    yield "\n95 % interval and number of cases in brackets; bold: target missed."
+    yield f"\n| score | target | {' | '.join(rows)} |"
+    yield "|---" * (len(rows) + 2) + "|"
+    for same in zip(*rows.values(), strict=True):
+        cells = [same[0].what, _target(same[0]), *map(_cell, same)]
         yield f"| {' | '.join(cells)} |"
-    yield from _table(
-        "answers by", {name: columns(some) for name, some in scored.items()}
-    )
-    for by, groups in tables(scored[judged]).items():
+    name, cases = next(iter(scored.items()))
+    yield f"\nOf {name}, class probabilities:"
+    yield "\n| mean probability | share right | 95 % interval | classes |"
+    yield "|---|---|---|---|"
+    for stated, found in reliability(class_statements(cases)):
+        yield f"| {100 * stated:.1f} % | {' | '.join(shown(found))} | {found.n} |"
+    for by, groups in tables(cases).items():
         yield from _table(by, groups)
-    yield "\n| truth | taken for | cases |\n|---|---|---|"
-    for truth, answer, count in mix_ups(scored[judged]):
+    yield "\n| truth | most probable | cases |\n|---|---|---|"
+    for truth, answer, count in mix_ups(cases):
         yield f"| {truth} | {answer} | {count} |"
-    measured = [c for c in scored[judged] if c.label.kind == "real"]
-    for name, some in scored.items() if measured else ():
-        for case in some:
-            chances = {**case.answer.probabilities, **case.answer.inclusion}
-            held = [f"{n} {100 * chances.get(n, 0.0):.0f} %" for n in case.answer.set]
-            stated = " or ".join(case.label.truth)
-            yield (
-                f"\nMeasured, stated {stated}; {name}: {case.answer.verdict}, "
-                f"set {', '.join(held)}"
-            )
+    yield from _measured(scored)
+
+
+def _measured(scored: Mapping[str, Cases]) -> Iterator[str]:
+    """Yield what was answered to measured data, which have no scores."""
+    for name, cases in scored.items():
+        for case in cases:
+            if case.label.kind == "real":
+                chances = case.answer.explanations
+                held = [f"{n} {100 * chances[n]:.0f} %" for n in case.answer.set]
+                causes = [*case.answer.classes, case.answer.outside]
+                acts = [
+                    f"{' or '.join(each.members)} {100 * each.acts:.0f} %"
+                    for each in causes
+                    if each.acts > 0.5
+                ]
+                yield (
+                    f"\nMeasured, stated {' or '.join(case.label.truth)}; {name}: "
+                    f"acts: {', '.join(acts) or 'nothing'}; set: {', '.join(held)}"
+                )
+
+
+def _cell(row: Row) -> str:
+    if row.found.value is None:
+        return ""
+    number, span = shown(row.found, row.unit)
+    number = f"**{number}**" if row.met is False else number
+    return f"{number} ({span}; {row.found.n})"
 
 
 def _table(first: str, groups: Mapping[str, Mapping[str, Estimate]]) -> Iterator[str]:
     yield f"\n| {first} | {' | '.join(COLUMNS)} |"
     yield "|---" * (len(COLUMNS) + 1) + "|"
-    units = {"set size": "effects", "log score": "nat", "Brier score": "nat"}
     for name, cells in groups.items():
         texts = [
-            f"{shown(found, units.get(column, 'share'))[0]} ({found.n})"
+            f"{shown(found, UNITS.get(column, 'share'))[0]} ({found.n})"
             for column, found in cells.items()
         ]
         yield f"| {name} | {' | '.join(texts)} |"
@@ -212,24 +232,20 @@ def _target(row: Row) -> str:
     )
     if np.isinf(row.target[0]):
         return f"≤ {high}"
-    return f"≥ {low}" if np.isinf(row.target[1]) else f"{low} … {high}"
+    text = f"≥ {low}" if np.isinf(row.target[1]) else f"{low} … {high}"
+    return f"{text} within its interval" if row.within else text
 
 
 def _draw_reliability(cases: Cases, path: Path) -> None:
-    """Draw stated probabilities against the share that was true."""
+    """Draw probabilities of classes against the share that was right."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5, 4.5), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], "--", color="grey")
-    for label, found in (
-        ("most probable hypothesis", top_statements(cases)),
-        ("single effects given 5 % or more", effect_statements(cases)),
-    ):
-        bins = reliability(found)
-        x = [stated for stated, _ in bins]
-        y = np.array([[e.value, e.lo, e.hi] for _, e in bins]).reshape(-1, 3).T
-        axes.errorbar(x, y[0], [y[0] - y[1], y[2] - y[0]], fmt="o", label=label)
-    axes.set(xlabel="stated probability", ylabel="share true", aspect="equal")
-    axes.legend()
+    bins = reliability(class_statements(cases))
+    x = [stated for stated, _ in bins]
+    y = np.array([[e.value, e.lo, e.hi] for _, e in bins]).reshape(-1, 3).T
+    axes.errorbar(x, y[0], [y[0] - y[1], y[2] - y[0]], fmt="o")
+    axes.set(xlabel="probability of a class", ylabel="share right", aspect="equal")
     figure.savefig(path, dpi=120)

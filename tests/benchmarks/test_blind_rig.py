@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.blind.cases import draw_cases, gear_file
-from benchmarks.blind.mixes import SHARES, SIZES
+from benchmarks.blind.cases import GEAR_TOML, draw_cases
+from benchmarks.blind.mixes import MIXES, draw_plans
 from benchmarks.blind.rig.contact import _curve
 from benchmarks.blind.rig.loadings import LOADINGS, rich
 from benchmarks.blind.rig.mechanisms import MECHANISMS
 from benchmarks.blind.rig.noise import NOISES
-from benchmarks.blind.rig.outside import LISTED, OUTSIDE
+from benchmarks.blind.rig.outside import OUTSIDE
 from benchmarks.blind.rig.virtual_rig import (
     ActiveMechanism,
     RigState,
@@ -38,13 +38,12 @@ def test_the_rig_imports_nothing_of_the_library():
 def test_every_effect_of_the_library_has_a_mechanism():
     # Without a run on the bare rig no reading shows its compliance.
     assert {*MECHANISMS, *NOISES} == {*hdcal.EFFECTS} - {"rig_compliance"}
-    assert len(OUTSIDE) == 65 and {*LISTED} < {*OUTSIDE}
+    assert len(OUTSIDE) == 65
     assert not {*OUTSIDE} & {*hdcal.EFFECTS}
 
 
-@pytest.mark.parametrize("mix", ["effects", "outside", "programs", "rigs"])
-def test_a_label_states_the_size_of_its_gap(mix: str):
-    for _, label in draw_cases(mix, 120, seed=11):
+def test_a_label_states_the_size_of_its_gap():
+    for _, label in draw_cases("rigs", 200, seed=11):
         if label.kind in ("effect", "outside") and label.truth[0] not in NOISES:
             rms = np.sqrt(np.mean(np.square(label.curve)))
             assert rms / label.sigma == pytest.approx(label.r, rel=2e-3), label.truth
@@ -68,32 +67,32 @@ def test_a_calibration_absorbs_slope_zero_and_loss_of_modulus():
 
 
 def test_the_same_seed_draws_the_same_cases():
-    first, again, other = (list(draw_cases("all", 6, seed)) for seed in (3, 3, 4))
+    first, again, other = (list(draw_cases("rigs", 6, seed)) for seed in (3, 3, 4))
     assert first == again
     assert all(one != two for one, two in zip(first, other, strict=True))
     with pytest.raises(InputError):
         next(draw_cases("some", 6, 3))
 
 
-def test_the_mix_all_has_the_published_proportions():
-    labels = [label for _, label in draw_cases("all", 200, seed=5)]
-    counts = Counter(label.mix for label in labels)
-    assert counts == {name: round(200 * share) for name, share in SHARES.items()}
-    assert {label.r for label in labels} == {0.0, *SIZES}
-    withheld = [label for label in labels if label.withheld]
+def test_a_mix_is_a_part_of_the_whole_design():
+    rng = np.random.default_rng(5)
+    whole = Counter(plan.part for plan in draw_plans("rigs", 310, rng))
+    sizes = {"effect": 140, "outside": 65, "composite": 44, "null": 36, "withheld": 25}
+    assert whole == sizes and whole.keys() == {*MIXES} - {"rigs"}
+    for part in whole:
+        assert {plan.part for plan in draw_plans(part, 10, rng)} == {part}
+    withheld = draw_plans("withheld", 60, rng)
     assert all(len(x.withheld) == 2 and x.truth[0] in x.withheld for x in withheld)
 
 
 def test_hdcal_reads_what_the_rig_writes(tmp_path):
-    (tmp_path / "gear.toml").write_text(gear_file("prior"))
-    for text, label in draw_cases("prior", 3, seed=8):
+    (tmp_path / "gear.toml").write_text(GEAR_TOML)
+    for text, label in draw_cases("null", 3, seed=8):
         (tmp_path / "data.csv").write_text(text)
         records = hdcal.read_case(tmp_path).records
-        history = LOADINGS[label.program]().history
-        np.testing.assert_allclose(records.deformation, history.deformation, atol=1e-5)
+        assert len(records.force) == label.rows
         left = np.asarray(records.force) - label.clean
-        assert np.std(left) < 1.5 * label.sigma * (1.0 + label.r)
-        np.testing.assert_array_equal(records.run, history.run)
+        assert np.std(left) < 1.5 * label.sigma
 
 
 def test_correlated_noise_has_its_variance_and_correlation():

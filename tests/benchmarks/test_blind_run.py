@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.blind import __main__ as program
-from benchmarks.blind.answers import answer_set, by_bic, by_hdcal, by_none, by_r2
+from benchmarks.blind.answers import answer_set
+from benchmarks.blind.diagnosers import by_bic, by_hdcal, by_none, by_r2
 from benchmarks.blind.rivals import closable_share, fit_each
+from benchmarks.blind.temperature import TEMPERATURES, at_each
 from commands import XB1
 from diagnosis_cases import NOISE, rich, simulated
 from rigs import make_case
@@ -51,8 +53,8 @@ def test_a_run_of_four_cases_with_an_interruption(tmp_path, monkeypatch, capsys)
         and f"answers {sha256} by 'stub'" in printed
     )
     scores = json.loads((folder / "result" / "scores.json").read_text())
-    named = {row["what"]: row["found"] for row in scores["rows"]}
-    wrong = named["true effect withheld, r = 1: another named"]
+    found = {row["what"]: row["found"] for row in scores["rows"]["stub"]}
+    wrong = found["true effect withheld: another stated at 90 %, nothing outside"]
     assert (wrong["value"], wrong["n"]) == (1.0, 4)
     assert printed.strip() == (folder / "result" / "scores.md").read_text().strip()
     assert (folder / "result" / "reliability.png").stat().st_size > 1000
@@ -76,9 +78,12 @@ def test_a_measurement_is_sealed_under_a_name_that_tells_nothing(tmp_path, capsy
     assert program.main([*make, "--cause", "contact_onset, plastic_yield"]) == 0
     assert [path.name for path in (folder / "cases").iterdir()] == ["case.csv"]
     assert program.main(["answer", str(folder), "--by", "none"]) == 0
-    assert program.main(["open", str(folder), "--key", f"{folder}.key"]) == 0
+    key = [str(folder), "--key", f"{folder}.key"]
+    assert program.main(["temperature", *key]) == 2
+    assert "is still sealed" in capsys.readouterr().err
+    assert program.main(["open", *key]) == 0
     printed = capsys.readouterr().out
-    assert "stated contact_onset or plastic_yield; none: none" in printed
+    assert "stated contact_onset or plastic_yield; none: acts: nothing" in printed
 
 
 SHOWN = {
@@ -110,16 +115,27 @@ def test_rivals_on_noise_alone():
     # In sample every effect fits at least as well as none.
     assert all(f.square <= found["none"].square + 1e-9 for f in found.values())
     bic, r2, none = (by(case, EFFECTS) for by in (by_bic, by_r2, by_none))
-    assert bic.verdict == none.verdict == "none" and r2.verdict == "named"
+    assert bic.set[0] == none.set[0] == "none" and r2.classes[0].acts == 1.0
     for each in (bic, r2, none):
-        assert np.isclose(sum(each.probabilities.values()), 1.0)
+        assert np.isclose(sum(each.explanations.values()), 1.0)
+        assert sum(each.explanations[name] for name in each.set) >= 0.9
 
 
-def test_new_evidence_answers():
+def test_hdcal_answers_as_it_decides():
     size = {"hysteresis": {"force": 4.0, "reach": 0.1}}
     plain, loop = (by_hdcal(simulated(rich(), e, seed=1), EFFECTS) for e in ({}, size))
-    assert plain.verdict == "none" and not plain.detected and plain.set == ("none",)
-    assert loop.effect == "hysteresis" and loop.inclusion["hysteresis"] > 0.9
-    assert loop.set == ("hysteresis",) and loop.closed is not None
+    assert not plain.detected and plain.set == ("none",)
+    assert loop.inclusion["hysteresis"] > 0.9 and loop.set == ("hysteresis",)
+    first = loop.classes[0]
+    assert first.members[0] == "hysteresis" and first.acts > 0.9
+    assert first.explains is not None and loop.gap_N is not None
     for each in (plain, loop):
-        assert np.isclose(sum(each.probabilities.values()), 1.0)
+        assert np.isclose(sum(each.explanations.values()), 1.0)
+
+
+def test_a_higher_temperature_is_less_sure():
+    size = {"hysteresis": {"force": 1.0, "reach": 0.1}}
+    found = at_each(simulated(rich(), size, seed=1), EFFECTS)
+    assert len(found) == len(TEMPERATURES)
+    cold, hot = (each.explanations["hysteresis"] for each in (found[0], found[-1]))
+    assert cold > hot + 0.01

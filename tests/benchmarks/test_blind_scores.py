@@ -6,25 +6,23 @@ import numpy as np
 import pytest
 from benchmarks.blind.calibration import calibration_error, reliability, statements
 from benchmarks.blind.estimates import mean, median, share
-from benchmarks.blind.label import Label
+from benchmarks.blind.label import NONE, OUTSIDE, Cause, Label
 from benchmarks.blind.scored_case import FLOOR, ScoredCase
-from benchmarks.blind.scores import columns, mix_ups, score_rows, tables
+from benchmarks.blind.scores import mix_ups, score_rows, tables
+from benchmarks.blind.temperature import TEMPERATURES, best_temperature
 from scipy.stats import norm
 from stub_diagnosers import answer
 
-GROUPS = {"slack": "contact", "stop": "contact", "drift": "time", "leak": "time"}
+EFFECTS = ("slack", "stop", "drift", "leak")
 Z2 = norm.ppf(0.975) ** 2
 
 
-def scored(chances, truth=("slack",), kind="effect", r=1.0, withheld=(), **more):
+def scored(chances, truth=("slack",), kind="effect", r=1.0, **more):
     """Return a case on the rich program; `more` are fields of the answer or label."""
-    about = {k: more.pop(k) for k in ("curve", "amplitude_true", "mix") if k in more}
-    about["amplitude"] = about.pop("amplitude_true", {})
-    noise = more.pop("noise", "iid"), more.pop("correlation", 0.0)
-    case = f"c{abs(hash((truth, kind, r, str(chances))))}"
-    about["withheld"] = withheld
-    label = Label(case, kind, truth, "rich", 180, r, *noise, 0.5, **about)
-    return ScoredCase(label, answer(case, chances, GROUPS, **more), GROUPS)
+    about = {k: more.pop(k) for k in ("curve", "withheld") if k in more}
+    noise, case = more.pop("noise", "iid"), f"{kind} {truth} {r} {chances}"
+    label = Label(case, kind, truth, "rich", 180, r, noise, 0.0, 0.5, **about)
+    return ScoredCase(label, answer(case, chances, EFFECTS, **more))
 
 
 def rows(cases, closable=None):
@@ -48,101 +46,89 @@ def test_intervals():
 
 
 def test_who_knows_the_truth_meets_every_target_and_who_says_none_does_not():
-    cases, silent = [], []
-    for r in (0.5, 1.0, 2.0, 5.0):
-        for truth in GROUPS:
-            cases += [scored({truth: 1.0}, (truth,), r=r)] * 5
-            silent += [scored({"none": 1.0}, (truth,), r=r)] * 5
-    for r in (1.0, 2.0):
-        cases += [scored({"unknown": 1.0}, (n,), "outside", r) for n in ("hum", "burr")]
-    cases += [scored({"none": 1.0}, (), "null", 0.0, noise="ar", correlation=0.6)] * 9
-    cases += [scored({"unknown": 1.0}, withheld=("slack", "leak"))]
-    met = [row.met for row in rows(cases).values()]
-    assert met.count(False) == 0 and met.count(True) >= 17
+    cases, silent, closable = [], [], {}
+    for r in (0.5, 1.0, 2.0):
+        for number, truth in enumerate(EFFECTS * 5):
+            # Nineteen of twenty intervals hold the truth.
+            span = (0.9, 0.8, 0.95) if number else (0.5, 0.4, 0.6)
+            classes = (Cause((truth,), 1.0, span),)
+            case = scored({truth: 1.0}, (truth,), r=r, classes=classes)
+            closable[case.label.case] = 0.9
+            cases.append(case)
+            silent.append(scored({NONE: 1.0}, (truth,), r=r))
+    cases += [scored({OUTSIDE: 1.0}, ("hum",), "outside", r) for r in (1.0, 2.0)]
+    cases += [scored({NONE: 1.0}, (), "null", 0.0, noise=n) for n in ("iid", "ar")]
+    cases += [scored({OUTSIDE: 1.0}, withheld=("slack", "leak"))]
+    met = [row.met for row in rows(cases, closable).values()]
+    assert met.count(False) == 0 and met.count(True) == 14
     found = rows(silent)
-    assert found["effects detected from r√n = 5 on"].found.value == 0.0
-    assert found["true effect first at r = 1, rich program"].found.value == 0.0
-    assert columns(silent)["log score"].value == pytest.approx(math.log(FLOOR))
-    assert columns(silent)["Brier score"].value == 2.0
-    assert (
-        columns(cases)["Brier score"].value == columns(cases)["log score"].value == 0.0
-    )
+    assert found["true effect most probable, r = 1, rich loading"].found.value == 0.0
+    score = found["log score of the true explanation"].found.value
+    assert score == pytest.approx(math.log(FLOOR))
+    assert rows(cases)["log score of the true explanation"].found.value == 0.0
 
 
-def test_first_effect_group_and_set():
-    tie = scored({"slack": 0.4, "stop": 0.4, "none": 0.2}, set=("slack", "stop"))
-    near = scored({"stop": 0.9, "slack": 0.1}, set=("stop",), verdict="group")
-    far = scored({"leak": 0.6, "slack+stop": 0.4}, set=("leak", "slack"))
-    found = rows([tie, near, far])
-    assert found["true effect first at r = 1, rich program"].found.value == 0.5 / 3
-    assert found["true group first at r = 1, rich program"].found.value == 2 / 3
-    assert found["90 % set holds the true effect, r ≥ 0.5"].found.value == 2 / 3
-    assert found["size of the 90 % set at r = 1"].found.value == 5 / 3
-    stated = found["a stated group is a true one, all kinds of cases"].found
-    assert (stated.value, stated.n) == (2 / 3, 3)
-    assert mix_ups([near, far, far])[0] == ("slack", "leak", 2)
-
-
-def test_names_are_counted_over_all_kinds_of_cases_but_withheld_ones():
-    right, wrong = {"slack": 1.0}, {"leak": 1.0}
-    cases = [
-        scored(right),
-        scored(wrong),
-        scored(wrong, ("hum",), "outside"),
-        scored(right, ("slack", "leak"), "pair"),
-        scored(right, ("slack",), "composite"),
-        scored(wrong, withheld=("slack", "stop")),
-        scored({"none": 1.0}, (), "null", 0.0),
-        scored(right, ("slack", "stop"), "real", 0.0),
-    ]
-    found = rows(cases)
-    names = found["a named effect is a true one, all kinds of cases"].found
-    assert (names.value, names.n) == (4 / 6, 6)
-    assert found["true effect withheld, r = 1: another named"].found.value == 1.0
-    assert found["outside, of the list given beforehand: an effect named"].found.n == 1
-    kinds = tables(cases)["kind"]
-    assert kinds["pair"]["names right"].value == 1.0
-    assert "withheld" in kinds and kinds["withheld"]["first"].n == 0
-    # Measured data have no single truth.
-    assert columns(cases)["log score"].n == 7
-
-
-def test_a_remainder_beside_an_effect_counts_for_the_effect():
-    case = scored({"slack+unknown": 0.5, "slack": 0.3, "unknown": 0.2})
-    assert case.probabilities == pytest.approx({"slack": 0.8, "unknown": 0.2})
-    assert case.log_score == pytest.approx(math.log(0.8))
-
-
-def test_false_alarms_are_counted_by_noise():
-    kinds = (("iid", 0.0), ("ar", 0.3), ("ar", 0.7), ("log", 0.9))
-    cases = [
-        scored({"none": 1.0}, (), "null", 0.0, noise=n, correlation=c, detected=c > 0.5)
-        for n, c in kinds
-    ]
-    found = [row.found.value for row in score_rows(cases, {})[:4]]
-    assert found == [0.0, 0.0, 1.0, 1.0]
-
-
-def test_sizes():
-    right = {
-        "curve": (0.3, -0.4),
-        "amplitude_true": {"slack.clearance": 0.02},
-        "amplitude": {"slack.clearance": (0.022, 0.019, 0.025)},
-        "gap": (0.4, 0.36, 0.5),
-        "closed": (0.8, 0.6, 0.85),
+def test_first_effect_set_and_classes():
+    merged = (Cause(("stop", "slack"), 0.95),)
+    tie = scored({"slack": 0.4, "stop": 0.4, NONE: 0.2}, set=("slack", "leak+stop"))
+    near = scored({"stop": 0.95, "slack": 0.05}, classes=merged)
+    far = scored({"leak": 0.995, NONE: 0.005}, set=("drift+slack",))
+    pair = scored({"drift+slack": 1.0}, kind="composite", classes=merged)
+    found = rows([tie, near, far, pair])
+    expected = {
+        "true effect most probable, r = 1, rich loading": (0.5 / 3, 3),
+        "true effect or its class stated at 90 %, r ≥ 1": (1 / 3, 3),
+        "of classes stated at 90 %, right": (2 / 3, 3),
+        "of classes stated at 99 %, right": (0.0, 1),
+        "effects in a class stated at 90 %, r ≥ 1": (1.5, 2),
+        "90 % set holds the true effect, r ≥ 0.5": (2 / 3, 3),
+        "explanations in the 90 % set, r = 1": (4 / 3, 3),
+        "… beside an effect: the effect or its class stated at 90 %": (1.0, 1),
     }
-    case = scored({"slack": 1.0}, **right)
-    found = rows([case, case], {case.label.case: 0.9})
-    gap = math.sqrt(0.125)
-    values = {
-        "error of the amplitude, r = 1": 0.1,
-        "95 % interval holds the amplitude, r = 1": 1.0,
-        "error of the size of the gap, r = 1": 0.4 / gap - 1.0,
-        "95 % interval holds the size of the gap, r = 1": 0.0,
-        "error of the closed share, true effect first": 0.1,
-        "95 % interval holds the closed share, true effect first": 0.0,
-    }
-    assert {n: found[n].found.value for n in values} == pytest.approx(values)
+    for words, (value, n) in expected.items():
+        assert found[words].found.value == pytest.approx(value), words
+        assert found[words].found.n == n, words
+    assert mix_ups([near, far, far, pair])[0] == ("slack", "leak", 2)
+    assert tables([tie, pair])["kind"].keys() == {"effect", "composite"}
+
+
+def test_a_score_below_its_target_is_met_where_its_interval_reaches_it():
+    cases = [scored({"slack": 1.0})] * 9 + [scored({"leak": 1.0})]
+    row = rows(cases)["true effect most probable, r = 1, rich loading"]
+    assert row.found.value == 0.9 and row.met
+    row = rows(cases * 40)["true effect most probable, r = 1, rich loading"]
+    assert row.met is False
+
+
+def test_an_incomplete_library():
+    away = {"withheld": ("slack", "stop")}
+    stated, beside = (Cause(("leak",), 0.9),), Cause((OUTSIDE,), 0.8)
+    cases = [
+        scored({"leak": 1.0}, classes=stated, **away),
+        scored({"leak": 1.0}, classes=stated, outside=beside, **away),
+        scored({"leak": 1.0}, ("hum",), "outside", outside=beside),
+        scored({"leak": 1.0}, ("hum",), "outside", 0.5, outside=beside),
+    ]
+    share_of = {"classes": (Cause(("slack",), 0.6, (0.5, 0.4, 0.6)),)}
+    whole = scored({"slack": 1.0}, kind="composite", **share_of)
+    other = scored({"slack": 1.0}, kind="composite", r=2.0, **share_of)
+    closable = {whole.label.case: 0.45, other.label.case: 0.7}
+    found = rows([*cases, whole, other], closable)
+    words = "true effect withheld: another stated at 90 %, nothing outside"
+    assert (found[words].found.value, found[words].found.n) == (0.5, 2)
+    words = "outside the library, r ≥ 1: stated to act, or the effect with its share"
+    assert (found[words].found.value, found[words].found.n) == (2 / 3, 3)
+    words = "… of an effect beside something outside"
+    assert (found[words].found.value, found[words].found.n) == (0.5, 2)
+    # A withheld effect cannot be right, and does not count.
+    assert found["of classes stated at 90 %, right"].found.n == 2
+
+
+def test_the_size_of_the_gap():
+    held = scored({"slack": 1.0}, curve=(0.3, -0.4), gap_N=(0.4, 0.3, 0.5))
+    missed = scored({"slack": 1.0}, curve=(0.3, -0.4), gap_N=(0.4, 0.36, 0.5))
+    row = rows([held, missed])["interval holds the rms of the gap, r ≥ 0.5"]
+    assert row.found.value == 0.5
 
 
 def test_calibration_of_the_calibrated_and_of_the_overconfident():
@@ -159,3 +145,12 @@ def test_calibration_of_the_calibrated_and_of_the_overconfident():
     assert sure.value == pytest.approx(0.3, abs=1e-6) and sure.lo < 0.3 < sure.hi
     ((mean_stated, share_true),) = reliability(statements(rows_))
     assert (mean_stated, share_true.value) == pytest.approx((0.9, 0.6))
+
+
+def test_the_temperature_of_the_overconfident():
+    # Odds of 9 to 1 where 3 to 1 are right: log 9 = 2 log 3.
+    odds = 9.0 ** (1.0 / TEMPERATURES)
+    right, wrong = np.log(odds / (1.0 + odds)), np.log(1.0 / (1.0 + odds))
+    found = best_temperature(np.array([right] * 300 + [wrong] * 100).T)
+    assert found.value == pytest.approx(2.0, rel=0.02)
+    assert found.lo < 2.0 < found.hi

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 from benchmarks.blind.answers import FROZEN, Frozen, read_frozen
-from benchmarks.blind.cases import draw_cases
+from benchmarks.blind.cases import GEAR_TOML, draw_cases
 from benchmarks.blind.opening import open_set
 from benchmarks.blind.sealed_set import (
     KEY,
@@ -27,10 +27,10 @@ SEED = 2**100 + 1
 
 
 def made(folder, seed=SEED, count=4):
-    """Write a set of the mix `effects` and its key beside it."""
-    drawn = [(t.encode(), label) for t, label in draw_cases("effects", count, seed)]
-    files = {"gear.toml": b"[gear]\n"}
-    key, more = folder / "set.key", {"mix": "effects", "seed": seed, "version": "0"}
+    """Write a set of the mix `effect` and its key beside it."""
+    drawn = [(t.encode(), label) for t, label in draw_cases("effect", count, seed)]
+    files = {"gear.toml": GEAR_TOML.encode()}
+    key, more = folder / "set.key", {"mix": "effect", "seed": seed, "version": "0"}
     return write_set(folder / "set", key, drawn, files, **more), key
 
 
@@ -38,7 +38,7 @@ def answered(found, by="stub", blind=True) -> None:
     """Write frozen answers to a set."""
     answers = tuple(answer(entry.case, {"none": 1.0}) for entry in found.manifest.cases)
     made_by = "0" * 64
-    frozen = Frozen(by, found.commitment, made_by, blind, {}, answers)
+    frozen = Frozen(by, found.commitment, made_by, blind, answers)
     write_hashed(found.folder / f"answers-{by}.json", FROZEN, frozen)
 
 
@@ -63,7 +63,7 @@ def test_the_seed_makes_the_same_set_again(tmp_path):
 
 
 def test_a_commitment_binds_label_table_mix_and_seed():
-    _, label = next(draw_cases("effects", 1, SEED))
+    _, label = next(draw_cases("effect", 1, SEED))
     table = digest(b"table")
     others = [
         label_commitment(replace(label, **change), SEED, table)
@@ -72,7 +72,7 @@ def test_a_commitment_binds_label_table_mix_and_seed():
     others += [label_commitment(label, SEED + 1, table)]
     others += [label_commitment(label, SEED, digest(b"other"))]
     assert label_commitment(label, SEED, table) not in others
-    origins = {origin_commitment(m, s) for m in ("all", "null") for s in (1, 2)}
+    origins = {origin_commitment(m, s) for m in ("rigs", "null") for s in (1, 2)}
     assert len({*others, *origins}) == 10
 
 
@@ -84,7 +84,7 @@ def test_another_label_is_detected(tmp_path, change):
     path.write_bytes(KEY.dump_json(replace(key, labels=labels)))
     with pytest.raises(InputError, match="another label of 'case-3'"):
         read_key(found, path)
-    path.write_bytes(KEY.dump_json(replace(key, mix="all")))
+    path.write_bytes(KEY.dump_json(replace(key, mix="rigs")))
     with pytest.raises(InputError, match="another mix or seed"):
         read_key(found, path)
     path.write_text("{}")
@@ -102,7 +102,7 @@ def test_a_changed_public_file_is_detected(tmp_path):
         read_set(found.folder)
     assert len(error.value.findings) == 2
     table.write_bytes(original)
-    found.gear.write_bytes(b"[gear]\n")
+    found.gear.write_bytes(GEAR_TOML.encode())
     text = manifest.read_text()
     manifest.write_text(text.replace('"version": "0"', '"version": "1"'))
     with pytest.raises(InputError, match="its hash does not fit"):
@@ -139,9 +139,7 @@ def test_changed_answers_are_detected(tmp_path):
     answered(found)
     path = found.folder / "answers-stub.json"
     assert read_frozen(found)["stub"][0].blind
-    path.write_text(
-        path.read_text().replace('"detected": false', '"detected": true', 1)
-    )
+    path.write_text(path.read_text().replace('"gap": 0.0', '"gap": 1.0', 1))
     with pytest.raises(InputError, match="its hash does not fit"):
         read_frozen(found)
     answered(replace(found, commitment="1" * 64))

@@ -116,9 +116,7 @@ def gears_differ(force, state: RigState, size: float, shape: Shape):
 
 
 CONTACT: dict[str, Mechanism] = {
-    "seating_slack": Mechanism(
-        "table", clearance, 0.12, draw=_seats, amplitude="seating_slack.clearance"
-    ),
+    "seating_slack": Mechanism("table", clearance, 0.12, draw=_seats),
     "contact_bedding": Mechanism(
         "gear", asperities, 0.06, draw=lambda rng: {"load": rng.uniform(0.02, 0.3)}
     ),

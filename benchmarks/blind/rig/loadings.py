@@ -36,13 +36,10 @@ class Writing:
         deformation_form: format of a deformation.
     """
 
-    force: float = 1.0
-    deformation: float = 1.0
-    force_form: str = ".4f"
-    deformation_form: str = ".5f"
-
-
-AS_SIMULATED = Writing()
+    force: float
+    deformation: float
+    force_form: str
+    deformation_form: str
 
 
 def draw_writing(rng: np.random.Generator) -> Writing:
@@ -92,7 +89,7 @@ class Loading:
                 found.add(f"{label}s")
         return frozenset(found)
 
-    def csv(self, force: np.ndarray, writing: Writing = AS_SIMULATED) -> str:
+    def csv(self, force: np.ndarray, writing: Writing) -> str:
         """Return the measurement file of these readings [N], shape (n,)."""
         deformation = self.history.deformation * writing.deformation
         table = {

@@ -72,7 +72,6 @@ LOOPS: dict[str, Mechanism] = {
         6.0,
         frozenset({"unloading"}),
         draw=_short,
-        amplitude="coulomb_friction.force",
     ),
     "load_friction": Mechanism(
         "path",
@@ -80,7 +79,6 @@ LOOPS: dict[str, Mechanism] = {
         0.2,
         frozenset({"unloading"}),
         draw=_short,
-        amplitude="load_friction.share",
     ),
     "hysteresis": Mechanism(
         "path", sliding_cells, 10.0, frozenset({"unloading"}), draw=_cells

@@ -35,13 +35,3 @@ OUTSIDE: dict[str, OutsideMechanism] = {
     for name, function in inspect.getmembers(module, inspect.isfunction)
     if function.__module__ == module.__name__ and not name.startswith("_")
 }
-# Specified together with the targets of version 0.1, and scored apart.
-LISTED = (
-    "step_in_mounting",
-    "hum",
-    "angle_by_temperature",
-    "direction_by_temperature",
-    "thermal_lag",
-    "crack",
-    "random_walk",
-)

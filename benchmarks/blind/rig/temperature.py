@@ -30,7 +30,6 @@ TEMPERATURE: dict[str, Mechanism] = {
         _NEEDS,
         draw=_bend,
         signed=True,
-        amplitude="thermal_expansion.slope",
     ),
     "thermal_stiffness": Mechanism(
         "gear", softening, 0.0015, _NEEDS, draw=_bend, signed=True
@@ -43,6 +42,5 @@ TEMPERATURE: dict[str, Mechanism] = {
         _NEEDS,
         draw=_bend,
         signed=True,
-        amplitude="thermal_zero_drift.slope",
     ),
 }

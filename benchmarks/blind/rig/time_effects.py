@@ -79,7 +79,6 @@ TIME: dict[str, Mechanism] = {
         0.01,
         _TIME,
         draw=lambda rng: {"slow": rng.uniform(0.0, 0.3)},
-        amplitude="charge_leakage.rate",
     ),
     "amplifier_drift": Mechanism(
         "reading",
@@ -88,6 +87,5 @@ TIME: dict[str, Mechanism] = {
         _TIME,
         draw=lambda rng: {"settle": np.exp(rng.uniform(np.log(800.0), np.log(8000.0)))},
         signed=True,
-        amplitude="amplifier_drift.rate",
     ),
 }

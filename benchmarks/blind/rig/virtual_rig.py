@@ -48,7 +48,6 @@ class Mechanism:
         needs: features of a loading without which it cannot be identified.
         draw: draws the shape.
         signed: whether the size may be negative.
-        amplitude: library parameter of the same meaning and unit as the size, if any.
     """
 
     stage: Literal["table", "gear", "path", "reading"]
@@ -57,7 +56,6 @@ class Mechanism:
     needs: frozenset[str] = frozenset()
     draw: Callable[[np.random.Generator], Shape] = lambda rng: {}
     signed: bool = False
-    amplitude: str = ""
 
 
 def draw_members(rng: np.random.Generator) -> Shape:
