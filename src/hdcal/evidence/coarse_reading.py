@@ -8,11 +8,14 @@ from jaxtyping import Float
 from hdcal.data.case import Case
 from hdcal.inference.noise_form import pilot_fit
 
-# A grid matters from this share of the noise sd on. Rounding to a step scatters by
-# step/√12: much wider than the noise, forces were set and not read.
-_LEAST, _MOST = 0.2, 1.5 * np.sqrt(12.0)
-# Significant digits of a file, digits that a step spans at least, and fits of the grid.
-_DIGITS, _SPANNED, _FITS = 6, 20.0, 6
+# A grid matters from one noise sd on: below, rounding adds less than a tenth to the
+# variance. Rounding to a step scatters by step/√12: much wider than the noise, forces
+# were set and not read.
+_LEAST, _MOST = 1.0, 1.5 * np.sqrt(12.0)
+# Forces lie on a grid where none is farther from it than this share of its step.
+_OFF = 0.05
+# Fits of the grid, and growth of the range of each.
+_FITS, _GROWTH = 8, 8.0
 
 
 def with_coarse_step(case: Case) -> Case:
@@ -45,16 +48,15 @@ def _grid_step(force: Float[np.ndarray, " n"], noise_sd: float) -> float:
     """Return the step of the grid on which all forces lie, 0 without one."""
     values = np.unique(force)
     gaps = np.diff(values)
-    gaps = gaps[gaps > noise_sd / _SPANNED]
+    gaps = gaps[gaps > _OFF * noise_sd]
     if len(gaps) < 2:
         return 0.0
     step, zero = float(gaps.min()), 0.0
-    for _ in range(_FITS):
-        counts = np.round((values - values[0]) / step)
-        if counts[-1] < 2.0:
-            return 0.0
-        step, zero = map(float, np.polyfit(counts, values, 1))
+    # A step that is a little wrong miscounts far values: near ones improve it first.
+    for reach in _GROWTH ** np.arange(1, _FITS + 1):
+        near = values[values <= values[0] + reach * step]
+        counts = np.round((near - values[0]) / step)
+        if counts[-1] >= 2.0 and len(near) > 2:
+            step, zero = map(float, np.polyfit(counts, near, 1))
     off = np.abs(values - zero - step * np.round((values - zero) / step))
-    largest = float(np.abs(values).max())
-    digit = max(10.0 ** (np.floor(np.log10(largest)) + 1.0 - _DIGITS), 1e-9)
-    return step if off.max() <= digit and step >= _SPANNED * digit else 0.0
+    return step if off.max() <= _OFF * step else 0.0
