@@ -15,7 +15,7 @@ from benchmarks.blind.answers import OPENED, read_frozen
 from benchmarks.blind.calibration import reliability
 from benchmarks.blind.estimates import Estimate
 from benchmarks.blind.label import Label
-from benchmarks.blind.rivals import closable_share
+from benchmarks.blind.rivals import closable
 from benchmarks.blind.scored_case import Cases, ScoredCase
 from benchmarks.blind.scores import (
     COLUMNS,
@@ -79,8 +79,8 @@ def open_set(folder: Path, key: Path) -> str:
     }
     # hdcal first, then in alphabetical order.
     scored = {n: pairs[n] for n in sorted(pairs, key=lambda n: (n != JUDGED, n))}
-    closable = closable_shares(found, secret.labels)
-    rows = {name: score_rows(cases, closable) for name, cases in scored.items()}
+    shares = closable_shares(found, secret.labels)
+    rows = {name: score_rows(cases, shares) for name, cases in scored.items()}
     cases = next(iter(scored.values()))
     head = [f"commitment {found.commitment}"]
     head += [
@@ -120,8 +120,10 @@ def _first_opening(found: BlindSet, hashes: dict[str, str]) -> Opened:
     return opened
 
 
-def closable_shares(found: BlindSet, labels: Sequence[Label]) -> dict[str, float]:
-    """Return the share of the gap's rms that the true effect can close, by case.
+def closable_shares(
+    found: BlindSet, labels: Sequence[Label]
+) -> dict[str, dict[str, float]]:
+    """Return the share of the gap's rms that each effect can close, by case.
 
     As the library's effect does, fitted to the readings without noise by least squares:
     the data come from other physics, so that even an effect that acts alone does not
@@ -129,16 +131,13 @@ def closable_shares(found: BlindSet, labels: Sequence[Label]) -> dict[str, float
     """
     shares = {}
     for label, entry in zip(labels, found.manifest.cases, strict=True):
-        known = label.kind in ("effect", "composite") and not label.withheld
-        if not known or label.r < LEAST_CLOSED_R:
+        if not label.clean or label.r < LEAST_CLOSED_R:
             continue
         case = hdcal.read_case(found.table(entry), found.gear)
         assert case.screening is not None
         clean = np.asarray(label.clean)[case.screening.kept]
         case = replace(case, records=replace(case.records, force=clean))
-        share = closable_share(case, label.truth[0], hdcal.EFFECTS, label.sigma)
-        if share is not None:
-            shares[label.case] = share
+        shares[label.case] = closable(case, hdcal.EFFECTS, label.sigma)
     return shares
 
 

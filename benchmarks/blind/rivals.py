@@ -83,24 +83,22 @@ def fit_each(
     return found
 
 
-def closable_share(
-    case: Case, name: str, library: Library, noise_sd: float
-) -> float | None:
-    """Return the share of a gap without noise that an effect of the library can close.
+def closable(case: Case, library: Library, noise_sd: float) -> dict[str, float]:
+    """Return the share of a gap without noise that each effect can close.
 
     Args:
         case: with readings without noise.
-        name: of the effect.
-        library: that contains it.
+        library: the effects; those that cannot be tested are left out.
         noise_sd: of the readings whose gap it was [N].
 
     Returns:
-        1 − RMS after over RMS before; None where the effect cannot be tested.
+        1 − RMS after over RMS before, by effect.
     """
-    found = fit_each(case, {name: library[name]}, noise_sd)
-    if name not in found or found[NONE].square <= 0.0:
-        return None
-    return 1.0 - float(np.sqrt(found[name].square / found[NONE].square))
+    found = fit_each(case, library, noise_sd)
+    whole = found.pop(NONE).square
+    if whole <= 0.0:
+        return {}
+    return {n: 1.0 - float(np.sqrt(fit.square / whole)) for n, fit in found.items()}
 
 
 def _straight(case: Case, noise_sd: float | None) -> _Straight:

@@ -53,7 +53,7 @@ def test_who_knows_the_truth_meets_every_target_and_who_says_none_does_not():
             span = (0.9, 0.8, 0.95) if number else (0.5, 0.4, 0.6)
             classes = (Cause((truth,), 1.0, span),)
             case = scored({truth: 1.0}, (truth,), r=r, classes=classes)
-            closable[case.label.case] = 0.9
+            closable[case.label.case] = {truth: 0.9}
             cases.append(case)
             silent.append(scored({NONE: 1.0}, (truth,), r=r))
     cases += [scored({OUTSIDE: 1.0}, ("hum",), "outside", r) for r in (1.0, 2.0)]
@@ -109,13 +109,16 @@ def test_an_incomplete_library():
         scored({"leak": 1.0}, ("hum",), "outside", outside=beside),
         scored({"leak": 1.0}, ("hum",), "outside", 0.5, outside=beside),
     ]
+    # The curve of another effect coincides with that of the one withheld.
+    like = scored({"leak": 1.0}, r=2.0, classes=stated, **away)
     share_of = {"classes": (Cause(("slack",), 0.6, (0.5, 0.4, 0.6)),)}
     whole = scored({"slack": 1.0}, kind="composite", **share_of)
     other = scored({"slack": 1.0}, kind="composite", r=2.0, **share_of)
-    closable = {whole.label.case: 0.45, other.label.case: 0.7}
-    found = rows([*cases, whole, other], closable)
-    words = "true effect withheld: another stated at 90 %, nothing outside"
-    assert (found[words].found.value, found[words].found.n) == (0.5, 2)
+    closable = {whole.label.case: {"slack": 0.45}, other.label.case: {"slack": 0.7}}
+    closable[like.label.case] = {"leak": 0.7}
+    found = rows([*cases, like, whole, other], closable)
+    words = "true effect withheld: a class of another curve stated at 90 %, alone"
+    assert (found[words].found.value, found[words].found.n) == (1 / 3, 3)
     words = "outside the library, r ≥ 1: stated to act, or the effect with its share"
     assert (found[words].found.value, found[words].found.n) == (2 / 3, 3)
     words = "… of an effect beside something outside"

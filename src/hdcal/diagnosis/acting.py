@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.parts import sampled_curves
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
 
-# A component acts from this squared visible length on, in noise variances, and from
-# this rms on, as a share of the largest force.
-_SHOWN, _MATTERS = 6.0, 1e-3
+# A component acts from this squared visible length on, in noise variances.
+_SHOWN = 6.0
 # Hypotheses of less probability are not drawn from: all that they contain acts.
 _NEGLIGIBLE, _DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
@@ -106,7 +106,7 @@ def _drawn(
     curves = sampled_curves(problem, noise, parts, _DRAWS, rng)
     # Structure within the rounding of a coarse reading shows nothing.
     largest = float(np.quantile(np.abs(problem.records.force), 0.99))
-    least = max(_MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
+    least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
     square = np.sum(curves**2, axis=2)
     shown = square > _SHOWN * problem.noise_sd**2
     shown &= square > least**2 * curves.shape[2]

@@ -16,6 +16,7 @@ from hdcal.data.loading import loading_side
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.diagnosis.contrasts import Contrast, contrasts
+from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.inference.distributions import moments
 from hdcal.inference.residual_shapes import (
@@ -29,8 +30,6 @@ from hdcal.quantities import Quantities
 from hdcal.report.item import INTERVAL, Interval, Item, Probability, Words
 from hdcal.report.words import load
 
-# Below this share of the largest force what is seen is said to be immaterial.
-_MATERIAL = 1e-3
 # Prior sd of the loss of modulus [1/K] that no stated material has.
 _ANY_MATERIAL = 1e-3
 # Correlation of neighbouring readings where the gear file states none: most rigs read
@@ -50,7 +49,7 @@ class Seen(Item):
         covariate: with which it goes.
         size_N: from its lowest to its highest place, simultaneous 95 % interval.
         p_value: adjusted for all that was looked for.
-        material: it is more than a thousandth of the largest force.
+        material: it is more than 0.025 % of the largest force.
     """
 
     statement: Words
@@ -209,5 +208,5 @@ def _seen(
         covariate=contrast.covariate,
         size_N=size,
         p_value=found.p_value,
-        material=size.median >= _MATERIAL * scale,
+        material=size.median >= MATTERS * scale,
     )

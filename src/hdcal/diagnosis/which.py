@@ -7,6 +7,9 @@ from hdcal.report.item import EffectName, Interval, Item, Probability, Words
 
 # From this probability on an effect is said to act, and to be named.
 LIKELY, NAMED = 0.5, 0.9
+# A gap matters from this rms on, as a share of the largest force: the error of
+# interpolation that ISO 376 allows its best class of force gauges, 00.
+MATTERS = 2.5e-4
 # Least p-value of an explanation that fits.
 ADEQUATE = 0.01
 
