@@ -103,7 +103,7 @@ def _drawn(
     problem, table = searched.problem, searched.table
     parts, noise = table.parts[key], table.likeliest_noise(key)
     names = [table.names[part.component] for part in parts]
-    curves = sampled_curves(problem, noise, parts, _DRAWS, rng)
+    curves, own = sampled_curves(problem, noise, parts, _DRAWS, rng)
     # Structure within the rounding of a coarse reading shows nothing.
     largest = float(np.quantile(np.abs(problem.records.force), 0.99))
     least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
@@ -116,7 +116,7 @@ def _drawn(
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)
         acts = [k for k, on in enumerate(pattern) if on]
-        curve = {names[k]: curves[k, these] for k in acts}
+        curve = {names[k]: own[k, these] for k in acts}
         gap = gaps[these]
         classes: dict[str, list[np.ndarray]] = defaultdict(list)
         for name, values in curve.items():

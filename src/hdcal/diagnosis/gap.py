@@ -69,7 +69,7 @@ def gap_by_row(
             draws.append(np.zeros((count, len(problem.y))))
         elif count:
             curves = sampled_curves(problem, noise, parts, int(count), rng)
-            draws.append(curves.sum(axis=0) / noise.weight)
+            draws.append(curves.whole.sum(axis=0) / noise.weight)
     # The gap is projected in the same way, so that it lies among the residuals.
     residual = problem.project(problem.y)
     return GapByRow(problem.records, residual, np.concatenate(draws))

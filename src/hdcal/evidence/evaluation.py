@@ -237,16 +237,21 @@ class Evaluated:
         atom = selection.atoms.pick([place.row])
         size = atom.bounded(self.atoms.mean[place][None])
         low = selection.atoms.amplitude.low[members]
+        log_chance = self.atoms.log_evidence[place.row]
+        chance = np.exp(log_chance - np.logaddexp.reduce(log_chance))
+        loose = _TOLERANCES[:, None, None] * selection.tolerance[place.row]
+        levels = tuple(zip(map(float, chance), loose, strict=True))
         return Part(
             component=component,
             offset=atom.offset[0],
             columns=atom.slope,
             mean=size,
             sd=np.maximum(np.abs(size), self.atoms.sd[place]),
-            loose=_TOLERANCES[place.column] * selection.tolerance[place.row],
+            loose=levels[place.column][1],
             one_sided=bool(low.min() == 0.0),
             place=place,
             spread=spread,
+            levels=levels,
         )
 
     def _likeliest_space(self, component: int) -> Part:
@@ -254,16 +259,18 @@ class Evaluated:
         place, spread = _largest(self.spaces.log_evidence, members)
         space = [*self.selection.spaces, *self.extra][place.row]
         count, rows = space.columns.shape
+        fixed = np.zeros((0, rows))
         return Part(
             component=component,
             offset=np.zeros(rows),
             columns=space.columns,
             mean=np.zeros(count),
             sd=np.full(count, space.scale[place.column]),
-            loose=np.zeros((0, rows)),
+            loose=fixed,
             one_sided=False,
             place=place,
             spread=spread,
+            levels=((1.0, fixed),),
         )
 
 

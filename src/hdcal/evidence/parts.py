@@ -1,7 +1,7 @@
 """Components at their most probable items, as Gaussian parts of a linear model."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ class Part(NamedTuple):
         one_sided: whether a is not negative.
         place: of the item.
         spread: log evidence of the component less that of the item, where it was found.
+        levels: probability of each tolerance of the shape, with its loose columns.
     """
 
     component: int
@@ -55,6 +56,7 @@ class Part(NamedTuple):
     one_sided: bool
     place: Place
     spread: float
+    levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
 
     @property
     def width(self) -> int:
@@ -70,6 +72,18 @@ class Part(NamedTuple):
         """Return the part as one of the base."""
         columns = np.concatenate([self.sd[:, None] * self.columns, self.loose])
         return Context(self.offset + self.mean @ self.columns, columns)
+
+
+class Curves(NamedTuple):
+    """Draws of what the base model leaves of each part, rows weighted by their noise.
+
+    Attributes:
+        whole: the part, the deviation of its shape included, shape (k, d, n).
+        own: with the shape of the library, shape (k, d, n).
+    """
+
+    whole: Float[np.ndarray, "k d n"]
+    own: Float[np.ndarray, "k d n"]
 
 
 def join(problem: LinearProblem, parts: Sequence[Part]) -> Context:
@@ -145,27 +159,49 @@ def sampled_curves(
     parts: Sequence[Part],
     count: int,
     rng: np.random.Generator,
-) -> Float[np.ndarray, "k d n"]:
-    """Return posterior draws of what the base model leaves of each part.
-
-    Rows are weighted by their noise.
+) -> Curves:
+    """Return posterior draws of the parts of a hypothesis.
 
     Args:
         problem: the case.
         noise: model of the noise.
-        parts: of one hypothesis.
+        parts: of the hypothesis.
         count: number of draws.
         rng: source of randomness.
     """
-    found = posterior(problem, noise, parts)
+    levels = [*product(*(part.levels for part in parts))]
+    chance = np.array([np.prod([share for share, _ in each]) for each in levels])
+    chance = chance / chance.sum()
+    drawn = []
+    for each, size in zip(levels, rng.multinomial(count, chance), strict=True):
+        if size:
+            loose = [
+                part._replace(loose=columns)
+                for part, (_, columns) in zip(parts, each, strict=True)
+            ]
+            drawn.append(_drawn(problem, noise, loose, size, rng))
+    return Curves(*(np.concatenate(some, axis=1) for some in zip(*drawn, strict=True)))
+
+
+def _drawn(
+    problem: LinearProblem,
+    noise: NoiseModel,
+    parts: Sequence[Part],
+    count: int,
+    rng: np.random.Generator,
+) -> Curves:
+    found, whole, own = posterior(problem, noise, parts), [], []
     normal = rng.standard_normal((count, len(found.mean)))
-    draws, curves = found.mean + normal @ found.factor, []
+    draws = found.mean + normal @ found.factor
     for part, place in zip(parts, coefficients(problem, parts), strict=True):
         values = draws[:, place]
         if part.one_sided:
             values[:, 0] = np.maximum(values[:, 0], part.least)
-        curves.append(part.context().offset + values @ found.columns[:, place].T)
-    return problem.project(np.stack(curves)) * noise.weight
+        offset, columns = (problem.project(e) * noise.weight for e in part.context())
+        size = len(part.columns)
+        own.append(offset + values[:, :size] @ columns[:size])
+        whole.append(own[-1] + values[:, size:] @ columns[size:])
+    return Curves(np.stack(whole), np.stack(own))
 
 
 def mean_curves(

@@ -161,8 +161,8 @@ def _carried(searched: Searched, key: Names, rng: np.random.Generator) -> float:
     curves = sampled_curves(searched.problem, noise, parts, _DRAWS, rng)
     effects = [
         curve
-        for part, curve in zip(parts, curves, strict=True)
+        for part, curve in zip(parts, curves.own, strict=True)
         if table.names[part.component] != OUTSIDE
     ]
-    chance = np.mean(share_closed(curves.sum(axis=0), effects) >= _CARRIED)
+    chance = np.mean(share_closed(curves.whole.sum(axis=0), effects) >= _CARRIED)
     return float(np.clip(chance, *_RANGE))
