@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hdcal.hypotheses import marginal
 from rigs import cycles, make_case, make_gear
 from scipy import integrate
 from scipy.stats import multivariate_normal
 
+from hdcal.evidence import marginal
 from hdcal.evidence.components import Amplitudes, Atoms, Space
 from hdcal.evidence.evaluation import Selection
 from hdcal.evidence.linear_problem import Expansion, LinearProblem, linear_problem

@@ -17,7 +17,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import erf
 
-from hdcal.evidence.effect_curves import effect_curves, padded_records
+from hdcal.data.records import Records
+from hdcal.evidence.effect_curves import (
+    curves_on_runs,
+    effect_curves,
+    padded_records,
+)
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
     FINE,
@@ -276,15 +281,16 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     return Space(owner, principal(columns), sd * STEPS, log_mass)
 
 
-def atom_on_rows(
-    effect: type[Effect], problem: LinearProblem, atom: Atoms
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+def atom_on_runs(
+    effect: type[Effect], problem: LinearProblem, atom: Atoms, runs: Records
+) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, "r n"]]:
     """Return offset and slope of one atom on other rows than it was made of [N].
 
     Args:
         effect: of the atom.
-        problem: with the other rows as its records.
+        problem: that the atom was made of.
         atom: picked by a single index.
+        runs: the other rows, several times as many, of shape (r, n).
     """
     shape, amplitude = int(atom.shape), atom.amplitude
     linear = float(amplitude.precision) > 0.0
@@ -293,21 +299,23 @@ def atom_on_rows(
     ends = [0.0, unit] if linear else [float(amplitude.low), float(amplitude.high)]
     values = {name: np.full(2, each[shape]) for name, each in grid.shapes.items()}
     values[grid.amplitudes[0]] = np.array(ends)
-    first, second = _curves(effect, problem, values)
-    slope = (second - first) / (ends[1] - ends[0])
-    return first - slope * ends[0], slope
+    found = curves_on_runs(effect, values, problem.base, runs, problem.reading)
+    slope = (found[:, 1] - found[:, 0]) / (ends[1] - ends[0])
+    return found[:, 0] - slope * ends[0], slope
 
 
-def space_on_rows(
-    effect: type[Effect], problem: LinearProblem, shape: int
-) -> Float[np.ndarray, "j n"]:
+def space_on_runs(
+    effect: type[Effect], problem: LinearProblem, shape: int, runs: Records
+) -> Float[np.ndarray, "r j n"]:
     """Return the columns of an effect with several amplitudes on other rows [N].
 
     Args:
         effect: with several amplitudes.
-        problem: with the other rows as its records.
+        problem: that its space was made of.
         shape: index of the point of its shape parameters.
+        runs: the other rows, several times as many, of shape (r, n).
     """
     grid = make_grid(effect, problem.priors, kind="subspace")
     shapes = {name: values[[shape]] for name, values in grid.shapes.items()}
-    return _curves(effect, problem, grid.one_amplitude_each(shapes))
+    values = grid.one_amplitude_each(shapes)
+    return curves_on_runs(effect, values, problem.base, runs, problem.reading)
