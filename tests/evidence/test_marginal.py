@@ -75,7 +75,7 @@ def evaluated(noise: NoiseModel, context: Context | None = None):
     )
     owner, shape = np.array([0, 1]), np.zeros(2, int)
     curves = np.zeros((2, ROWS)), np.stack([BEND, BEND])
-    atoms = Atoms(owner, shape, *curves, amplitude, none)
+    atoms = Atoms(owner, shape, owner, amplitude, none, *curves)
     space = Space(2, COLUMNS, np.array([0.3]), np.zeros(1))
     loose = np.zeros((2, 1, ROWS))
     selection = Selection(PROBLEM, atoms, loose, (space,), NAMES)

@@ -164,7 +164,7 @@ def _on_runs(
     selection, problem = searched.selection, searched.problem
     effect = searched.predicting.effects[selection.names[part.component]]
     if np.any(selection.atoms.owner == part.component):
-        atom = selection.atoms.pick(part.place.row)
+        atom = selection.atoms.pick(np.array([part.place.row]))
         offset, slope = atom_on_runs(effect, problem, atom, after)
         return offset[:, -ROWS:], slope[:, None, -ROWS:]
     count, nothing = len(after.force), np.zeros((len(after.force), ROWS))

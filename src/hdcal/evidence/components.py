@@ -67,22 +67,33 @@ class Atoms(NamedTuple):
     Attributes:
         owner: index of the effect, shape (m,).
         shape: index of the point of its shape parameters, shape (m,).
-        offset: contribution at amplitude 0 [N], shape (m, n).
-        slope: contribution per unit of the amplitude [N], shape (m, n).
+        curve: index of its curve, shape (m,).
         amplitude: priors of the amplitudes.
         log_weight: log prior probability of each atom of its effect, shape (m,).
+        offset: contribution of each curve at amplitude 0 [N], shape (c, n).
+        slope: contribution per unit of the amplitude [N], shape (c, n).
     """
 
     owner: Int[np.ndarray, " m"]
     shape: Int[np.ndarray, " m"]
-    offset: Float[np.ndarray, "m n"]
-    slope: Float[np.ndarray, "m n"]
+    curve: Int[np.ndarray, " m"]
     amplitude: Amplitudes
     log_weight: Float[np.ndarray, " m"]
+    offset: Float[np.ndarray, "c n"]
+    slope: Float[np.ndarray, "c n"]
 
-    def pick(self, index) -> "Atoms":
-        """Return some of the atoms."""
-        return jax.tree.map(lambda leaf: leaf[index], self)
+    def pick(self, index: Int[np.ndarray, " k"]) -> "Atoms":
+        """Return some of the atoms, each with a curve of its own."""
+        own, curve = np.arange(len(index)), self.curve[index]
+        return Atoms(
+            self.owner[index],
+            self.shape[index],
+            own,
+            Amplitudes(*(column[index] for column in self.amplitude)),
+            self.log_weight[index],
+            self.offset[curve],
+            self.slope[curve],
+        )
 
     def bounded(self, size: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
         """Return amplitudes moved to the nearest possible ones."""
@@ -132,7 +143,7 @@ def components(
     nothing = Amplitudes(none, none, none, none, none)
     rows = np.zeros((0, len(problem.y)))
     index = none.astype(int)
-    atoms = [Atoms(index, index, rows, rows, nothing, none)]
+    atoms = [Atoms(index, index, index, nothing, none, rows, rows)]
     spaces: list[Space] = []
     for owner, effect in enumerate(effects[name] for name in names):
         if issubclass(effect, Scatter):
@@ -142,7 +153,9 @@ def components(
         if len(grid.amplitudes) > 1:
             spaces += _several_amplitudes(owner, effect, problem)
         else:
-            atoms.append(_one_amplitude(owner, grid, problem))
+            found = _one_amplitude(owner, grid, problem)
+            before = sum(len(each.slope) for each in atoms)
+            atoms.append(found._replace(curve=before + found.curve))
     together = jax.tree.map(lambda *leaves: np.concatenate(leaves), *atoms)
     return Components(names, together, tuple(spaces))
 
@@ -187,13 +200,11 @@ def _linear_atoms(
 ) -> Atoms:
     scales, weights = _widths(grid)
     sds = np.tile(grid.sd * scales, len(slope))
-    slope = np.repeat(slope, len(scales), axis=0)
     sides, same = 2.0 if grid.one_sided else 1.0, np.ones(len(sds))
     return Atoms(
         owner=np.full(len(sds), owner),
         shape=np.repeat(np.arange(grid.size), len(scales)),
-        offset=np.zeros_like(slope),
-        slope=slope,
+        curve=np.repeat(np.arange(grid.size), len(scales)),
         amplitude=Amplitudes(
             low=(0.0 if grid.one_sided else -np.inf) * same,
             high=np.inf * same,
@@ -202,6 +213,8 @@ def _linear_atoms(
             log_height=np.log(sides / (sds * np.sqrt(2.0 * np.pi))),
         ),
         log_weight=np.tile(np.log(weights), grid.size) - np.log(grid.size),
+        offset=np.zeros_like(slope),
+        slope=slope,
     )
 
 
@@ -215,8 +228,7 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
     return Atoms(
         owner=np.full(len(none), owner),
         shape=np.repeat(np.arange(grid.size), len(width)),
-        offset=offset.reshape(len(none), -1),
-        slope=slope.reshape(len(none), -1),
+        curve=np.arange(len(none)),
         amplitude=Amplitudes(
             low=np.tile(edges[:-1], grid.size),
             high=np.tile(edges[1:], grid.size),
@@ -225,6 +237,8 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
             log_height=log_height,
         ),
         log_weight=none - np.log(grid.size),
+        offset=offset.reshape(len(none), -1),
+        slope=slope.reshape(len(none), -1),
     )
 
 
@@ -289,14 +303,14 @@ def atom_on_runs(
     Args:
         effect: of the atom.
         problem: that the atom was made of.
-        atom: picked by a single index.
+        atom: a single one.
         runs: the other rows, several times as many, of shape (r, n).
     """
-    shape, amplitude = int(atom.shape), atom.amplitude
-    linear = float(amplitude.precision) > 0.0
+    shape, amplitude = int(atom.shape[0]), atom.amplitude
+    linear = float(amplitude.precision[0]) > 0.0
     grid = make_grid(effect, problem.priors, FINE, "linear" if linear else "cells")
     unit = grid.mean + 2.0 * grid.sd
-    ends = [0.0, unit] if linear else [float(amplitude.low), float(amplitude.high)]
+    ends = (0.0, unit) if linear else (amplitude.low[0], amplitude.high[0])
     values = {name: np.full(2, each[shape]) for name, each in grid.shapes.items()}
     values[grid.amplitudes[0]] = np.array(ends)
     found = curves_on_runs(effect, values, problem.base, runs, problem.reading)

@@ -13,7 +13,7 @@ from hdcal.physics.effect import Effect
 
 # Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.
-_BLOCK, _MOST_VALUES = 16, 2**22
+_BLOCK, _MOST_VALUES = 64, 2**22
 # Records predicted at a time, at most.
 _RUNS = 11
 

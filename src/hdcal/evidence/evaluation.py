@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.evidence.components import MOST_COLUMNS, STEPS, Atoms, Space
+from hdcal.evidence.components import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.marginal import Items, Products, log_marginal
 from hdcal.evidence.noise_models import NoiseModel
@@ -169,7 +169,7 @@ class Selection:
         self, projection: Projection, white: _Atoms, only: set[int] | None
     ) -> Items:
         rows = _rows(self.atoms.owner, only)
-        white, atoms = _pick(white, rows), self.atoms.pick(rows)
+        white = _pick(white, rows)
         curves = projection.curves(white.offset, white.slope)
         axes = projection.axes(white.loose, white.gram)
         te = axes.products(axes.along_y - white.with_offset, curves.error_q)
@@ -178,10 +178,10 @@ class Selection:
             self.problem.count,
             Products(*curves[:3], te, tu, axes.square),
             np.broadcast_to(_TOLERANCES**2, (len(te), len(_TOLERANCES))),
-            atoms.amplitude,
+            Amplitudes(*(column[rows] for column in self.atoms.amplitude)),
             self.problem.noise_prior,
         )
-        weight = atoms.log_weight[:, None] + np.log(_TOLERANCE_WEIGHTS)
+        weight = self.atoms.log_weight[rows, None] + np.log(_TOLERANCE_WEIGHTS)
         log_evidence = found.log_evidence + weight + projection.constant
         found = found._replace(log_evidence=log_evidence)
         if only is None:
@@ -274,7 +274,7 @@ class Evaluated:
         selection = self.selection
         members = np.flatnonzero(selection.atoms.owner == component)
         place, spread = _largest(self.atoms.log_evidence, members)
-        atom = selection.atoms.pick([place.row])
+        atom = selection.atoms.pick(np.array([place.row]))
         size = atom.bounded(self.atoms.mean[place][None])
         low = selection.atoms.amplitude.low[members]
         return Part(

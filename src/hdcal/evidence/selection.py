@@ -66,7 +66,7 @@ def _alone(projection: Projection, atoms: Atoms) -> Items:
     problem = projection.problem
     curves = projection.curves(*map(projection.whiten, (atoms.offset, atoms.slope)))
     none, single = np.zeros((len(atoms.owner), 0)), np.zeros((len(atoms.owner), 1))
-    products = Products(*curves[:3], none, none, none)
+    products = Products(*(e[atoms.curve] for e in curves[:3]), none, none, none)
     found = log_marginal(
         problem.count, products, single, atoms.amplitude, problem.noise_prior
     )
