@@ -18,11 +18,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.special import erf
 
 from hdcal.data.records import Records
-from hdcal.evidence.effect_curves import (
-    curves_on_runs,
-    effect_curves,
-    padded_records,
-)
+from hdcal.evidence.effect_curves import curves_on_runs, effect_curves
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
     FINE,
@@ -168,7 +164,8 @@ def principal(columns: Float[np.ndarray, "k n"], most: int = MOST_COLUMNS):
 
 
 def _curves(effect: type[Effect], problem: LinearProblem, values: dict):
-    return effect_curves(effect, values, problem.base, problem.records, problem.reading)
+    found = effect_curves(effect, values, problem.base, problem.padded, problem.reading)
+    return found[:, : len(problem.y)]
 
 
 def _table(grid: ParameterGrid, problem: LinearProblem, amplitudes):
@@ -284,7 +281,7 @@ def _shown(grid: ParameterGrid, problem: LinearProblem) -> Bool[np.ndarray, " s"
 def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space:
     """Return the space of members (runs, specimens) that deviate by one unit each."""
     label = np.asarray(getattr(problem.records, effect.members))
-    padded = getattr(padded_records(problem.records), effect.members)
+    padded = getattr(problem.padded, effect.members)
     score = np.asarray(scores(padded))[: len(label)]
     added = _curves(effect, problem, {"sd": np.ones(1)})[0] / score
     columns = added * (label == np.unique(label)[:, None])

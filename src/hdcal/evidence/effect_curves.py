@@ -28,17 +28,6 @@ def padded_records(records: Records) -> Records:
 
 
 @jit
-def _base_reading(base: Base, records: Records, reading: Reading):
-    return predict_reading(base, (), records, reading)[0]
-
-
-def base_reading(base: Base, records: Records, reading: Reading) -> np.ndarray:
-    """Return the mean reading without effects [N], shape (n,)."""
-    found = _base_reading(base, padded_records(records), reading)
-    return np.asarray(found)[: len(records.force)]
-
-
-@jit
 def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 
@@ -57,7 +46,7 @@ def effect_curves(
     effect: type[Effect],
     values: dict[str, np.ndarray],
     base: Base,
-    records: Records,
+    padded: Records,
     reading: Reading,
 ) -> np.ndarray:
     """Return the effect's contribution to the mean reading [N].
@@ -66,14 +55,13 @@ def effect_curves(
         effect: the effect.
         values: of every parameter, each of shape (g,).
         base: the force model about which it acts.
-        records: the rows.
+        padded: the rows, from `padded_records`.
         reading: how the rig reads.
 
     Returns:
-        Shape (g, n).
+        Shape (g, n), of all padded rows.
     """
-    rows, padded = len(records.force), padded_records(records)
-    block = int(np.clip(_MOST_VALUES // rows, 1, _BLOCK))
+    block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
     table = {name: np.asarray(column, float) for name, column in values.items()}
     count = len(next(iter(table.values())))
     table = repeat_last_row(table, count + -count % block)
@@ -81,7 +69,7 @@ def effect_curves(
         np.asarray(_curves(effect(**_rows(table, i, block)), base, padded, reading))
         for i in range(0, count, block)
     ]
-    return np.concatenate(parts)[:count, :rows]
+    return np.concatenate(parts)[:count]
 
 
 def curves_on_runs(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.linalg import cho_solve
@@ -20,6 +21,7 @@ from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
 from hdcal.data.scatter import left_of_lines
 from hdcal.evidence.covariates import noise_correlations, tolerance_functions
+from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.row_features import take_rows
 from hdcal.inference import distributions, serial_correlation
 from hdcal.inference.noise_form import pilot_fit
@@ -73,6 +75,11 @@ class LinearProblem:
     offsets: int = 0
 
     @cached_property
+    def padded(self) -> Records:
+        """The records as arrays of JAX, padded to a length that many cases share."""
+        return jax.device_put(padded_records(self.records))
+
+    @cached_property
     def root(self) -> Float[np.ndarray, "p p"]:
         """The upper triangular R with R'R = X'X + noise_sd² I."""
         held = self.noise_sd * np.eye(self.X.shape[1])
@@ -103,10 +110,18 @@ class LinearProblem:
         follows = self.before >= 0
         gain = (1.0 - correlation**2) ** -0.5
         white = curves * (weight * np.where(follows, gain, 1.0))
-        white -= curves[..., self.before] * (
-            weight[self.before] * np.where(follows, correlation * gain, 0.0)
-        )
+        tied = weight[self.before] * np.where(follows, correlation * gain, 0.0)
+        if self._in_order:
+            white[..., 1:] -= curves[..., :-1] * tied[1:]
+        else:
+            white -= curves[..., self.before] * tied
         return white
+
+    @cached_property
+    def _in_order(self) -> bool:
+        """Whether the row before one in its run is the row above it, if any is."""
+        follows = np.flatnonzero(self.before >= 0)
+        return bool(np.all(self.before[follows] == follows - 1))
 
     @property
     def count(self) -> int:

@@ -131,6 +131,8 @@ def log_sign_probability(
     Parts of a context are Gaussian without bounds. The change of this probability by
     another component restores the bounds.
     """
+    if not any(part.one_sided for part in parts):
+        return 0.0
     found, total = posterior(problem, noise, parts), 0.0
     for part, place in zip(parts, coefficients(problem, parts), strict=True):
         if part.one_sided:
@@ -164,8 +166,9 @@ def sampled_curves(
         values = draws[:, place]
         if part.one_sided:
             values[:, 0] = np.maximum(values[:, 0], part.least)
-        curves.append(part.context().offset + values @ found.columns[:, place].T)
-    return problem.project(np.stack(curves)) * noise.weight
+        offset, columns = (problem.project(e) * noise.weight for e in part.context())
+        curves.append(offset + values @ columns)
+    return np.stack(curves)
 
 
 def mean_curves(
