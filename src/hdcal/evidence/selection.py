@@ -66,7 +66,8 @@ def _alone(projection: Projection, atoms: Atoms) -> Items:
     problem = projection.problem
     curves = projection.curves(*map(projection.whiten, (atoms.offset, atoms.slope)))
     none, single = np.zeros((len(atoms.owner), 0)), np.zeros((len(atoms.owner), 1))
-    products = Products(*(e[atoms.curve] for e in curves[:3]), none, none, none)
+    ee, eu, uu = (each[atoms.curve] for each in curves[:3])
+    products = Products(ee, eu, uu, none, none, none)
     found = log_marginal(
         problem.count, products, single, atoms.amplitude, problem.noise_prior
     )
