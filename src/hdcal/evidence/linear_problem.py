@@ -32,6 +32,8 @@ from hdcal.physics.theory import THEORIES
 
 # Least noise sd as a share of the largest force: computed readings have no noise.
 _LEAST_NOISE = 1e-6
+# Numbers that are whitened at a time.
+_AT_HAND = 2**16
 # Prior sd of a fixed parameter.
 _FIXED = 1e-9
 
@@ -106,16 +108,22 @@ class LinearProblem:
         """
         if correlation == 0.0:
             return curves * weight
-        # As `serial_correlation.whiten` does, with few passes over many curves.
+        # As `serial_correlation.whiten` does, a few curves at a time: of long records
+        # they are larger than what a processor keeps at hand.
         follows = self.before >= 0
         gain = (1.0 - correlation**2) ** -0.5
-        white = curves * (weight * np.where(follows, gain, 1.0))
+        scale = weight * np.where(follows, gain, 1.0)
         tied = weight[self.before] * np.where(follows, correlation * gain, 0.0)
-        if self._in_order:
-            white[..., 1:] -= curves[..., :-1] * tied[1:]
-        else:
-            white -= curves[..., self.before] * tied
-        return white
+        table = curves.reshape(-1, curves.shape[-1])
+        white, step = np.empty_like(table), max(1, _AT_HAND // len(weight))
+        for start in range(0, len(table), step):
+            few, found = table[start : start + step], white[start : start + step]
+            np.multiply(few, scale, out=found)
+            if self._in_order:
+                found[:, 1:] -= few[:, :-1] * tied[1:]
+            else:
+                found -= few[:, self.before] * tied
+        return white.reshape(curves.shape)
 
     @cached_property
     def _in_order(self) -> bool:
