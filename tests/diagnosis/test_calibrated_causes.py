@@ -26,7 +26,7 @@ def found() -> Diagnosis:
     case = simulated(cycles(60), LOOP, seed=1)
     with pytest.MonkeyPatch.context() as patch:
         short = partial(calibrate, **SHORT)
-        patch.setattr("hdcal.diagnosis.refit.calibrate", short)
+        patch.setattr("hdcal.calibration.calibrate.calibrate", short)
         library = {name: EFFECTS[name] for name in ("coulomb_friction", "outliers")}
         return diagnose(case, library=library)
 

@@ -172,7 +172,7 @@ def test_a_calibration_that_failed_is_marked_in_every_file(
     def fails(*_, **__):
         return SimpleNamespace(usable=False, reasons=("chains disagree",))
 
-    monkeypatch.setattr("hdcal.diagnosis.refit.calibrate", fails)
+    monkeypatch.setattr("hdcal.calibration.calibrate.calibrate", fails)
     done = here("diagnose", cases["one"], "--out", "alone")
     assert done.returncode == 1 and "chains disagree" in done.stdout
     found = json.loads((tmp_path / "alone" / "verdict.json").read_text("utf-8"))

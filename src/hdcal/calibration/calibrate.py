@@ -1,19 +1,19 @@
 """Calibrate a case: from records and gear to a checked posterior."""
 
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from difflib import get_close_matches
 
 import numpy as np
 
+from hdcal.calibration.known_effects import check_effect_priors, check_names
 from hdcal.calibration.straight_part import straight_check
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import (
     Specifics,
@@ -28,16 +28,15 @@ from hdcal.inference.checks import (
     rounding_check,
 )
 from hdcal.inference.identifiability import linearise
-from hdcal.inference.members import MEMBER_SD, MEMBERS
+from hdcal.inference.members import MEMBERS
 from hdcal.inference.noise_form import noise_grows, pilot_fit
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.straight_line import line_check
 from hdcal.inference.structure import ModelStructure, decide_structure
-from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.effect import Effect
 from hdcal.physics.effects.noise import HeteroscedasticNoise
-from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
@@ -72,70 +71,6 @@ def choose_effects(
         raise InputError([Finding("effects", f"'{names}' is one text", remedy)])
     check_names(names, registry, "effects")
     return tuple(registry[name] for name in dict.fromkeys(names))
-
-
-def check_names(
-    names: Sequence[str], registry: Mapping[str, type[Effect]], parameter: str
-) -> None:
-    """Check that effects are in the library.
-
-    Args:
-        names: of effects.
-        registry: the library.
-        parameter: that the names were given as, for the finding.
-
-    Raises:
-        InputError: a name is not; the nearest one is suggested.
-    """
-    with Findings() as findings:
-        for name in names:
-            if name not in registry:
-                problem = f"no effect is called '{name}'"
-                library = f"The library holds: {', '.join(sorted(registry))}"
-                remedy = f"{_nearest(name, registry)}{library}"
-                findings.append(Finding(parameter, problem, remedy))
-
-
-def check_effect_priors(
-    case: Case, registry: Mapping[str, type[Effect]] = EFFECTS
-) -> None:
-    """Check the gear file's priors of effects against the library.
-
-    Raises:
-        InputError: an effect or parameter is not in the library, the unit is of
-            another kind, or the spread belongs to the model's own members.
-    """
-    known = {
-        f"{name}.{field}": spec.unit
-        for name, effect in registry.items()
-        for field, spec in parameters(effect).items()
-    }
-    scatter = {
-        f"{name}.sd": MEMBER_SD[effect.members]
-        for name, effect in registry.items()
-        if issubclass(effect, Scatter)
-    }
-    with Findings() as findings:
-        for name, prior in case.gear.effect_priors.items():
-            if name in scatter:
-                problem = "has its prior under another name"
-                remedy = f"Give it as {scatter[name]}"
-            elif name not in known:
-                problem = "is no parameter of an effect in the library"
-                remedy = f"{_nearest(name, known)}`hdcal effects` lists them"
-            elif prior.unit not in ("", known[name]):
-                problem = f"has the unit {prior.unit}, not {known[name]}"
-                remedy = f"Give it in {known[name]}"
-            else:
-                continue
-            column = f"priors.{name}"
-            findings.append(Finding("gear file", problem, remedy, column=column))
-
-
-def _nearest(name: str, known: Collection[str]) -> str:
-    """Return a question for the nearest known name; empty if none is near."""
-    near = get_close_matches(name, known, n=1)
-    return f"Did you mean '{near[0]}'? " if near else ""
 
 
 def calibrate(

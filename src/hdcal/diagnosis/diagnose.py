@@ -1,11 +1,12 @@
 """Diagnose a case: where model and readings part, which effect causes it, how far."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from hdcal.calibration.calibrate import check_effect_priors
+from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
@@ -35,13 +36,14 @@ from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.noise_models import OUTLIERS
 from hdcal.evidence.search import Searched, search
 from hdcal.evidence.table import OUTSIDE
-from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
-from hdcal.prediction.engine.pooled import pool
 from hdcal.report.item import Interval
 from hdcal.versions import versions
+
+if TYPE_CHECKING:
+    from hdcal.inference.sample import Progress
 
 
 # Thousands of small systems are solved, over which threads only wait for each other.
@@ -52,7 +54,7 @@ def diagnose(
     library: Mapping[str, type[Effect]] | None = None,
     quick: bool = False,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: "Progress | None" = None,
 ) -> Diagnosis:
     """Say where model and readings part, which effect causes it and how far it closes.
 
@@ -146,6 +148,8 @@ def _stiffness(fits: Refits) -> Interval | None:
     """Return the stiffness as read over all models [N/mm]."""
     if not fits.posteriors:
         return None
+    from hdcal.prediction.engine.pooled import pool
+
     return Interval.of(pool([*fits.posteriors.values()]).values["stiffness"])
 
 

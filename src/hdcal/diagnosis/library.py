@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from hdcal.calibration.calibrate import check_names
+from hdcal.calibration.known_effects import check_names
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS

@@ -9,7 +9,7 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Literal
 
-from hdcal.calibration.calibrate import check_effect_priors
+from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.cli.console import Console
 from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
@@ -256,13 +256,14 @@ def _diagnose_one(
 
 def _write(found: "Diagnosis", folder: Path, command: str, *, report: bool) -> None:
     """Write what `hdcal diagnose` leaves behind for one case."""
-    from hdcal.inference.posterior_file import FILE_NAME
-    from hdcal.prediction.bands.bands import default_bands
     from hdcal.report.result_folder import page_files
-    from hdcal.report.table_files import columns_csv
 
     files = {"verdict.json": found.to_json().encode()}
     if (average := found.average) is not None:
+        from hdcal.inference.posterior_file import FILE_NAME
+        from hdcal.prediction.bands.bands import default_bands
+        from hdcal.report.table_files import columns_csv
+
         bands = default_bands([*found.posteriors.values()])
         files["bands.csv"] = columns_csv(dict(bands.to_frame())).encode()
         files[FILE_NAME] = average.to_netcdf()

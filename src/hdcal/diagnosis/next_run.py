@@ -7,16 +7,15 @@ is left out.
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from typing import NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Records
-from hdcal.diagnosis.candidate_runs import ROWS, CandidateRun, candidate_runs
-from hdcal.evidence.components import atom_on_rows, space_on_rows
+from hdcal.diagnosis.candidate_runs import ROWS, candidate_runs
+from hdcal.evidence.components import atom_on_runs, space_on_runs
 from hdcal.evidence.linear_problem import base_columns
 from hdcal.evidence.parts import Part, coefficients, posterior
 from hdcal.evidence.search import Searched
@@ -43,12 +42,16 @@ class NextRun(Item):
     cost: str
 
 
-@dataclass(frozen=True)
-class _Predicted:
-    """Readings of a run under one hypothesis: normal, (m,) and (m, m) [N]."""
+class _Readings(NamedTuple):
+    """Normal readings of runs under each hypothesis, and of one run likewise.
 
-    mean: Float[np.ndarray, " m"]
-    covariance: Float[np.ndarray, "m m"]
+    Attributes:
+        mean: shape (r, h, m) [N].
+        covariance: shape (r, h, m, m).
+    """
+
+    mean: Float[np.ndarray, "*r h m"]
+    covariance: Float[np.ndarray, "*r h m m"]
 
 
 def rank_runs(
@@ -69,12 +72,13 @@ def rank_runs(
     problem = searched.problem
     runs = candidate_runs(problem.records, problem.reading.reference_temperature)
     weight, names = np.array([*share.values()]), [*share]
+    predicted = _predicted(searched, names, [run.records for run in runs])
     # The same random numbers for every run: they are compared with each other.
     drawn, ranked = rng.normal(size=(_DRAWS, ROWS)), []
-    for run in runs:
-        predicted = [_predicted(searched, key, run) for key in names]
-        nats, apart = _information(predicted, weight, drawn)
-        one, two = max(apart, key=lambda pair: apart[pair])
+    for run, *both in zip(runs, *predicted, strict=True):
+        readings = _Readings(*both)
+        one, two = _farthest(readings, weight)
+        nats = _information(readings, weight, drawn)
         found = NextRun(
             run=run.words,
             separates=_differing(names[one], names[two]),
@@ -113,70 +117,84 @@ def _differing(one: Names, two: Names) -> tuple[Names, Names]:
     return (tuple(sorted(left)), tuple(sorted(right))) if left and right else (one, two)
 
 
-def _predicted(searched: Searched, key: Names, run: CandidateRun) -> _Predicted:
-    """Return the readings of a run after all that were taken."""
+def _predicted(
+    searched: Searched, keys: Sequence[Names], runs: Sequence[Records]
+) -> _Readings:
+    """Return the readings of each run after all that were taken, runs first."""
     problem, table = searched.problem, searched.table
-    parts = table.parts.get(key, [])
-    fit = posterior(problem, table.likeliest_noise(key), parts)
-    new = run.records
-    width = problem.X.shape[1]
-    columns = np.zeros((ROWS, len(fit.mean)))
-    columns[:, :width] = base_columns(
-        new, problem.reading, problem.priors, problem.base, problem.log_sd
+    about = problem.reading, problem.priors, problem.base, problem.log_sd
+    base = np.stack([base_columns(run, *about) for run in runs])
+    after = _after(problem.records, runs)
+    curves: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
+    mean, covariance = [], []
+    for key in keys:
+        parts = table.parts.get(key, [])
+        fit = posterior(problem, table.likeliest_noise(key), parts)
+        columns = np.zeros((*base.shape[:2], len(fit.mean)))
+        columns[..., : problem.X.shape[1]] = base
+        offset = np.zeros(base.shape[:2])
+        for part, place in zip(parts, coefficients(problem, parts), strict=True):
+            which = part.component, part.place
+            if which not in curves:
+                curves[which] = _on_runs(searched, part, after)
+            start, own = curves[which]
+            offset += start + part.mean @ own
+            wide = np.moveaxis(part.sd[:, None] * own, 1, 2)
+            columns[..., place][..., : wide.shape[2]] = wide
+        mean.append(offset + columns @ fit.mean)
+        spread = columns @ fit.factor.T
+        noise = problem.noise_sd**2 * np.eye(ROWS)
+        covariance.append(spread @ np.swapaxes(spread, 1, 2) + noise)
+    return _Readings(np.stack(mean, axis=1), np.stack(covariance, axis=1))
+
+
+def _after(old: Records, runs: Sequence[Records]) -> Records:
+    """Return each run with all records before it, runs first."""
+    return jax.tree.map(
+        lambda before, *new: np.stack([np.concatenate([before, n]) for n in new]),
+        *(old, *runs),
     )
-    offset = np.zeros(ROWS)
-    for part, place in zip(parts, coefficients(problem, parts), strict=True):
-        start, own = _on_run(searched, part, new)
-        offset += start + part.mean @ own
-        columns[:, place][:, : len(own)] = (part.sd[:, None] * own).T
-    spread = columns @ fit.factor.T
-    covariance = spread @ spread.T + problem.noise_sd**2 * np.eye(ROWS)
-    return _Predicted(offset + columns @ fit.mean, covariance)
 
 
-def _on_run(
-    searched: Searched, part: Part, new: Records
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "j m"]]:
-    """Return offset and columns of a part on a run, history included."""
+def _on_runs(
+    searched: Searched, part: Part, after: Records
+) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, "r j m"]]:
+    """Return offset and columns of a part on each run, history included."""
     selection, problem = searched.selection, searched.problem
     effect = searched.predicting.effects[selection.names[part.component]]
-    joined = jax.tree.map(
-        lambda old, more: np.concatenate([old, more]), problem.records, new
-    )
-    after = replace(problem, records=joined)
     if np.any(selection.atoms.owner == part.component):
-        atom = selection.atoms.pick(part.place.row)
-        offset, slope = atom_on_rows(effect, after, atom)
-        return offset[-ROWS:], slope[None, -ROWS:]
+        atom = selection.atoms.pick(np.array([part.place.row]))
+        offset, slope = atom_on_runs(effect, problem, atom, after)
+        return offset[:, -ROWS:], slope[:, None, -ROWS:]
+    count, nothing = len(after.force), np.zeros((len(after.force), ROWS))
     shape = selection.spaces[part.place.row].shape
     if shape < 0:
         # Members of a new run or gear are new: nothing is known of them.
-        return np.zeros(ROWS), np.zeros((len(part.columns), ROWS))
-    return np.zeros(ROWS), space_on_rows(effect, after, shape)[:, -ROWS:]
+        return nothing, np.zeros((count, len(part.columns), ROWS))
+    return nothing, space_on_runs(effect, problem, shape, after)[..., -ROWS:]
 
 
-def _information(
-    predicted: Sequence[_Predicted], share: Float[np.ndarray, " h"], normal
-) -> tuple[float, dict[tuple[int, int], float]]:
-    """Return the mutual information [nat] and how far each pair lies apart."""
-    factors = [np.linalg.cholesky(one.covariance) for one in predicted]
-    half_log_det = [float(np.sum(np.log(np.diag(f)))) for f in factors]
+def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -> float:
+    """Return the mutual information of hypothesis and readings of one run [nat]."""
+    mean, factor = predicted.mean, np.linalg.cholesky(predicted.covariance)
+    inverse = np.linalg.inv(factor)
+    half_log_det = np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
     total = 0.0
-    for index, one in enumerate(predicted):
-        drawn = one.mean + normal @ factors[index].T
-        heights = np.stack(
-            [
-                -0.5 * np.sum(np.linalg.solve(f, (drawn - each.mean).T) ** 2, axis=0)
-                - h
-                for each, f, h in zip(predicted, factors, half_log_det, strict=True)
-            ]
-        )
+    for index in range(len(share)):
+        drawn = mean[index] + normal @ factor[index].T
+        off = (drawn - mean[:, None]) @ np.swapaxes(inverse, 1, 2)
+        heights = -0.5 * np.einsum("hdm,hdm->hd", off, off) - half_log_det[:, None]
         joint = heights + np.log(np.maximum(share, 1e-300))[:, None]
         top = np.logaddexp.reduce(joint, axis=0)
         total += share[index] * float(np.mean(heights[index] - top))
-    apart = {}
-    for i, j in combinations(range(len(predicted)), 2):
-        gap = predicted[i].mean - predicted[j].mean
-        both = predicted[i].covariance + predicted[j].covariance
-        apart[i, j] = float(gap @ np.linalg.solve(both, gap)) * share[i] * share[j]
-    return max(total, 0.0), apart
+    return max(total, 0.0)
+
+
+def _farthest(predicted: _Readings, share: Float[np.ndarray, " h"]) -> tuple[int, int]:
+    """Return the two hypotheses that lie farthest apart."""
+    one, two = np.triu_indices(len(share), 1)
+    gap = predicted.mean[one] - predicted.mean[two]
+    both = predicted.covariance[one] + predicted.covariance[two]
+    squared = np.sum(gap * np.linalg.solve(both, gap[..., None])[..., 0], axis=1)
+    best = int(np.argmax(squared * share[one] * share[two]))
+    return int(one[best]), int(two[best])

@@ -10,17 +10,19 @@ least.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdcal.calibration.calibrate import calibrate
 from hdcal.data.case import Case
 from hdcal.evidence.fewer_rows import thin_rows
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
+
+if TYPE_CHECKING:
+    from hdcal.inference.sample import Progress
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
@@ -68,7 +70,7 @@ def refit(
     hypotheses: Mapping[Names, float],
     library: dict[str, type[Effect]],
     seed: int,
-    progress: Progress | None,
+    progress: "Progress | None",
     *,
     quick: bool = False,
 ) -> Refits:
@@ -84,6 +86,9 @@ def refit(
     """
     if quick:
         return Refits({}, None, {})
+    # Importing what samples takes longer than all the rest of a quick diagnosis.
+    from hdcal.calibration.calibrate import calibrate
+
     probabilities = {_name(names): chance for names, chance in hypotheses.items()}
     count, finished = len(_probable(probabilities)), 0
 

@@ -17,7 +17,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import erf
 
-from hdcal.evidence.effect_curves import effect_curves, padded_records
+from hdcal.data.records import Records
+from hdcal.evidence.effect_curves import curves_on_runs, effect_curves
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
     FINE,
@@ -62,22 +63,33 @@ class Atoms(NamedTuple):
     Attributes:
         owner: index of the effect, shape (m,).
         shape: index of the point of its shape parameters, shape (m,).
-        offset: contribution at amplitude 0 [N], shape (m, n).
-        slope: contribution per unit of the amplitude [N], shape (m, n).
+        curve: index of its curve, shape (m,).
         amplitude: priors of the amplitudes.
         log_weight: log prior probability of each atom of its effect, shape (m,).
+        offset: contribution of each curve at amplitude 0 [N], shape (c, n).
+        slope: contribution per unit of the amplitude [N], shape (c, n).
     """
 
     owner: Int[np.ndarray, " m"]
     shape: Int[np.ndarray, " m"]
-    offset: Float[np.ndarray, "m n"]
-    slope: Float[np.ndarray, "m n"]
+    curve: Int[np.ndarray, " m"]
     amplitude: Amplitudes
     log_weight: Float[np.ndarray, " m"]
+    offset: Float[np.ndarray, "c n"]
+    slope: Float[np.ndarray, "c n"]
 
-    def pick(self, index) -> "Atoms":
-        """Return some of the atoms."""
-        return jax.tree.map(lambda leaf: leaf[index], self)
+    def pick(self, index: Int[np.ndarray, " k"]) -> "Atoms":
+        """Return some of the atoms, each with a curve of its own."""
+        own, curve = np.arange(len(index)), self.curve[index]
+        return Atoms(
+            self.owner[index],
+            self.shape[index],
+            own,
+            Amplitudes(*(column[index] for column in self.amplitude)),
+            self.log_weight[index],
+            self.offset[curve],
+            self.slope[curve],
+        )
 
     def bounded(self, size: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
         """Return amplitudes moved to the nearest possible ones."""
@@ -127,7 +139,7 @@ def components(
     nothing = Amplitudes(none, none, none, none, none)
     rows = np.zeros((0, len(problem.y)))
     index = none.astype(int)
-    atoms = [Atoms(index, index, rows, rows, nothing, none)]
+    atoms = [Atoms(index, index, index, nothing, none, rows, rows)]
     spaces: list[Space] = []
     for owner, effect in enumerate(effects[name] for name in names):
         if issubclass(effect, Scatter):
@@ -137,7 +149,9 @@ def components(
         if len(grid.amplitudes) > 1:
             spaces += _several_amplitudes(owner, effect, problem)
         else:
-            atoms.append(_one_amplitude(owner, grid, problem))
+            found = _one_amplitude(owner, grid, problem)
+            before = sum(len(each.slope) for each in atoms)
+            atoms.append(found._replace(curve=before + found.curve))
     together = jax.tree.map(lambda *leaves: np.concatenate(leaves), *atoms)
     return Components(names, together, tuple(spaces))
 
@@ -150,7 +164,8 @@ def principal(columns: Float[np.ndarray, "k n"], most: int = MOST_COLUMNS):
 
 
 def _curves(effect: type[Effect], problem: LinearProblem, values: dict):
-    return effect_curves(effect, values, problem.base, problem.records, problem.reading)
+    found = effect_curves(effect, values, problem.base, problem.padded, problem.reading)
+    return found[:, : len(problem.y)]
 
 
 def _table(grid: ParameterGrid, problem: LinearProblem, amplitudes):
@@ -182,13 +197,11 @@ def _linear_atoms(
 ) -> Atoms:
     scales, weights = _widths(grid)
     sds = np.tile(grid.sd * scales, len(slope))
-    slope = np.repeat(slope, len(scales), axis=0)
     sides, same = 2.0 if grid.one_sided else 1.0, np.ones(len(sds))
     return Atoms(
         owner=np.full(len(sds), owner),
         shape=np.repeat(np.arange(grid.size), len(scales)),
-        offset=np.zeros_like(slope),
-        slope=slope,
+        curve=np.repeat(np.arange(grid.size), len(scales)),
         amplitude=Amplitudes(
             low=(0.0 if grid.one_sided else -np.inf) * same,
             high=np.inf * same,
@@ -197,6 +210,8 @@ def _linear_atoms(
             log_height=np.log(sides / (sds * np.sqrt(2.0 * np.pi))),
         ),
         log_weight=np.tile(np.log(weights), grid.size) - np.log(grid.size),
+        offset=np.zeros_like(slope),
+        slope=slope,
     )
 
 
@@ -210,8 +225,7 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
     return Atoms(
         owner=np.full(len(none), owner),
         shape=np.repeat(np.arange(grid.size), len(width)),
-        offset=offset.reshape(len(none), -1),
-        slope=slope.reshape(len(none), -1),
+        curve=np.arange(len(none)),
         amplitude=Amplitudes(
             low=np.tile(edges[:-1], grid.size),
             high=np.tile(edges[1:], grid.size),
@@ -220,6 +234,8 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
             log_height=log_height,
         ),
         log_weight=none - np.log(grid.size),
+        offset=offset.reshape(len(none), -1),
+        slope=slope.reshape(len(none), -1),
     )
 
 
@@ -265,7 +281,7 @@ def _shown(grid: ParameterGrid, problem: LinearProblem) -> Bool[np.ndarray, " s"
 def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space:
     """Return the space of members (runs, specimens) that deviate by one unit each."""
     label = np.asarray(getattr(problem.records, effect.members))
-    padded = getattr(padded_records(problem.records), effect.members)
+    padded = getattr(problem.padded, effect.members)
     score = np.asarray(scores(padded))[: len(label)]
     added = _curves(effect, problem, {"sd": np.ones(1)})[0] / score
     columns = added * (label == np.unique(label)[:, None])
@@ -276,38 +292,41 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     return Space(owner, principal(columns), sd * STEPS, log_mass)
 
 
-def atom_on_rows(
-    effect: type[Effect], problem: LinearProblem, atom: Atoms
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+def atom_on_runs(
+    effect: type[Effect], problem: LinearProblem, atom: Atoms, runs: Records
+) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, "r n"]]:
     """Return offset and slope of one atom on other rows than it was made of [N].
 
     Args:
         effect: of the atom.
-        problem: with the other rows as its records.
-        atom: picked by a single index.
+        problem: that the atom was made of.
+        atom: a single one.
+        runs: the other rows, several times as many, of shape (r, n).
     """
-    shape, amplitude = int(atom.shape), atom.amplitude
-    linear = float(amplitude.precision) > 0.0
+    shape, amplitude = int(atom.shape[0]), atom.amplitude
+    linear = float(amplitude.precision[0]) > 0.0
     grid = make_grid(effect, problem.priors, FINE, "linear" if linear else "cells")
     unit = grid.mean + 2.0 * grid.sd
-    ends = [0.0, unit] if linear else [float(amplitude.low), float(amplitude.high)]
+    ends = (0.0, unit) if linear else (amplitude.low[0], amplitude.high[0])
     values = {name: np.full(2, each[shape]) for name, each in grid.shapes.items()}
     values[grid.amplitudes[0]] = np.array(ends)
-    first, second = _curves(effect, problem, values)
-    slope = (second - first) / (ends[1] - ends[0])
-    return first - slope * ends[0], slope
+    found = curves_on_runs(effect, values, problem.base, runs, problem.reading)
+    slope = (found[:, 1] - found[:, 0]) / (ends[1] - ends[0])
+    return found[:, 0] - slope * ends[0], slope
 
 
-def space_on_rows(
-    effect: type[Effect], problem: LinearProblem, shape: int
-) -> Float[np.ndarray, "j n"]:
+def space_on_runs(
+    effect: type[Effect], problem: LinearProblem, shape: int, runs: Records
+) -> Float[np.ndarray, "r j n"]:
     """Return the columns of an effect with several amplitudes on other rows [N].
 
     Args:
         effect: with several amplitudes.
-        problem: with the other rows as its records.
+        problem: that its space was made of.
         shape: index of the point of its shape parameters.
+        runs: the other rows, several times as many, of shape (r, n).
     """
     grid = make_grid(effect, problem.priors, kind="subspace")
     shapes = {name: values[[shape]] for name, values in grid.shapes.items()}
-    return _curves(effect, problem, grid.one_amplitude_each(shapes))
+    values = grid.one_amplitude_each(shapes)
+    return curves_on_runs(effect, values, problem.base, runs, problem.reading)

@@ -7,13 +7,15 @@ import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.exported import jit
-from hdcal.inference.padding import pad_records, repeat_last_row
+from hdcal.inference.padding import bucket_size, pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 
 # Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.
-_BLOCK, _MOST_VALUES = 16, 2**22
+_BLOCK, _MOST_VALUES = 64, 2**22
+# Records predicted at a time, at most.
+_RUNS = 11
 
 
 def padded_records(records: Records) -> Records:
@@ -26,17 +28,6 @@ def padded_records(records: Records) -> Records:
 
 
 @jit
-def _base_reading(base: Base, records: Records, reading: Reading):
-    return predict_reading(base, (), records, reading)[0]
-
-
-def base_reading(base: Base, records: Records, reading: Reading) -> np.ndarray:
-    """Return the mean reading without effects [N], shape (n,)."""
-    found = _base_reading(base, padded_records(records), reading)
-    return np.asarray(found)[: len(records.force)]
-
-
-@jit
 def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 
@@ -46,11 +37,16 @@ def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     return jax.vmap(one)(effects)
 
 
+@jit
+def _curves_on_runs(effects: Effect, base: Base, runs: Records, reading: Reading):
+    return jax.vmap(lambda records: _curves(effects, base, records, reading))(runs)
+
+
 def effect_curves(
     effect: type[Effect],
     values: dict[str, np.ndarray],
     base: Base,
-    records: Records,
+    padded: Records,
     reading: Reading,
 ) -> np.ndarray:
     """Return the effect's contribution to the mean reading [N].
@@ -59,14 +55,13 @@ def effect_curves(
         effect: the effect.
         values: of every parameter, each of shape (g,).
         base: the force model about which it acts.
-        records: the rows.
+        padded: the rows, from `padded_records`.
         reading: how the rig reads.
 
     Returns:
-        Shape (g, n).
+        Shape (g, n), of all padded rows.
     """
-    rows, padded = len(records.force), padded_records(records)
-    block = int(np.clip(_MOST_VALUES // rows, 1, _BLOCK))
+    block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
     table = {name: np.asarray(column, float) for name, column in values.items()}
     count = len(next(iter(table.values())))
     table = repeat_last_row(table, count + -count % block)
@@ -74,7 +69,38 @@ def effect_curves(
         np.asarray(_curves(effect(**_rows(table, i, block)), base, padded, reading))
         for i in range(0, count, block)
     ]
-    return np.concatenate(parts)[:count, :rows]
+    return np.concatenate(parts)[:count]
+
+
+def curves_on_runs(
+    effect: type[Effect],
+    values: dict[str, np.ndarray],
+    base: Base,
+    runs: Records,
+    reading: Reading,
+) -> np.ndarray:
+    """Return the effect's contribution to the mean reading of several records [N].
+
+    Args:
+        effect: the effect.
+        values: of every parameter, each of shape (g,).
+        base: the force model about which it acts.
+        runs: records of shape (r, n).
+        reading: how the rig reads.
+
+    Returns:
+        Shape (r, g, n).
+    """
+    count, rows = runs.force.shape
+    same = replace(runs, known=frozenset())
+    padded = jax.tree.map(
+        lambda column: np.pad(
+            column, [(0, _RUNS - count), (0, bucket_size(rows) - rows)], "edge"
+        ),
+        same,
+    )
+    found = _curves_on_runs(effect(**values), base, padded, reading)
+    return np.asarray(found)[:count, :, :rows]
 
 
 def _rows(table: dict[str, np.ndarray], start: int, count: int):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.linalg import cho_solve
@@ -20,6 +21,7 @@ from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
 from hdcal.data.scatter import left_of_lines
 from hdcal.evidence.covariates import noise_correlations, tolerance_functions
+from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.row_features import take_rows
 from hdcal.inference import distributions, serial_correlation
 from hdcal.inference.noise_form import pilot_fit
@@ -30,6 +32,8 @@ from hdcal.physics.theory import THEORIES
 
 # Least noise sd as a share of the largest force: computed readings have no noise.
 _LEAST_NOISE = 1e-6
+# Numbers that are whitened at a time.
+_AT_HAND = 2**16
 # Prior sd of a fixed parameter.
 _FIXED = 1e-9
 
@@ -73,6 +77,11 @@ class LinearProblem:
     offsets: int = 0
 
     @cached_property
+    def padded(self) -> Records:
+        """The records as arrays of JAX, padded to a length that many cases share."""
+        return jax.device_put(padded_records(self.records))
+
+    @cached_property
     def root(self) -> Float[np.ndarray, "p p"]:
         """The upper triangular R with R'R = X'X + noise_sd² I."""
         held = self.noise_sd * np.eye(self.X.shape[1])
@@ -97,12 +106,30 @@ class LinearProblem:
             weight: one over the relative noise sd of each row, shape (n,).
             correlation: AR(1) coefficient of the noise.
         """
-        scaled = curves * weight
         if correlation == 0.0:
-            return scaled
-        first = np.moveaxis(scaled, -1, 0)
-        white = serial_correlation.whiten(first, self.before, correlation)
-        return np.ascontiguousarray(np.moveaxis(white, 0, -1))
+            return curves * weight
+        # As `serial_correlation.whiten` does, a few curves at a time: of long records
+        # they are larger than what a processor keeps at hand.
+        follows = self.before >= 0
+        gain = (1.0 - correlation**2) ** -0.5
+        scale = weight * np.where(follows, gain, 1.0)
+        tied = weight[self.before] * np.where(follows, correlation * gain, 0.0)
+        table = curves.reshape(-1, curves.shape[-1])
+        white, step = np.empty_like(table), max(1, _AT_HAND // len(weight))
+        for start in range(0, len(table), step):
+            few, found = table[start : start + step], white[start : start + step]
+            np.multiply(few, scale, out=found)
+            if self._in_order:
+                found[:, 1:] -= few[:, :-1] * tied[1:]
+            else:
+                found -= few[:, self.before] * tied
+        return white.reshape(curves.shape)
+
+    @cached_property
+    def _in_order(self) -> bool:
+        """Whether the row before one in its run is the row above it, if any is."""
+        follows = np.flatnonzero(self.before >= 0)
+        return bool(np.all(self.before[follows] == follows - 1))
 
     @property
     def count(self) -> int:

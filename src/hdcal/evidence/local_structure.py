@@ -83,12 +83,15 @@ def likeliest_members(
     half = np.linalg.solve(problem.root.T, problem.X.T).T
     found = []
     for family in families:
-        inside = family @ half
+        # One large product of matrices, not many small ones.
+        along = family.reshape(-1, len(error)) @ np.column_stack([half, error])
+        along = along.reshape(len(family), 2, -1)
+        inside = along[..., :-1]
         gram = family @ np.swapaxes(family, 1, 2) - inside @ np.swapaxes(inside, 1, 2)
         (a, b), (_, d) = np.moveaxis(gram, 0, -1)
         ridge = 1e-9 * np.max(a + d)
         a, d = a + ridge, d + ridge
-        one, two = (family @ error).T
+        one, two = along[..., -1].T
         # Decrease of the squared error by the best combination of both directions.
         gain = (d * one**2 - 2.0 * b * one * two + a * two**2) / (a * d - b**2)
         best = problem.project(family[int(np.argmax(gain))])

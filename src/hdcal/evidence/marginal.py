@@ -24,36 +24,24 @@ _TINY = 1e-12
 _STEPS = 3
 
 
-class SlopeProducts(NamedTuple):
-    """Inner products with the slope u, beside the base.
-
-    Attributes:
-        eu: of error and slope, shape (m, t).
-        uu: of the slope with itself, shape (m, t).
-        teu: of each principal axis with the error times with the slope, (m, t, j).
-        tu2: of each axis with the slope, squared, (m, t, j).
-    """
-
-    eu: Float[np.ndarray, " m t"]
-    uu: Float[np.ndarray, " m t"]
-    teu: Float[np.ndarray, "m t j"]
-    tu2: Float[np.ndarray, "m t j"]
-
-
 class Products(NamedTuple):
     """Inner products of items in whitened rows, beside the base.
 
     Attributes:
-        ee: of the error, the readings less o, with itself, shape (m, t).
-        lam: prior variance times squared length of each axis of L, (m, t, j).
-        te2: of each axis with the error, squared, times the prior variance, (m, t, j).
-        slope: those with the slope; None for items without one.
+        ee: of the error, the readings less o, with itself, shape (m,).
+        eu: of error and slope, shape (m,); zeros for items without one.
+        uu: of the slope with itself, likewise.
+        te: of each principal axis of L with the error, shape (m, j).
+        tu: of each axis with the slope, shape (m, j).
+        square: squared length of each axis, shape (m, j).
     """
 
-    ee: Float[np.ndarray, " m t"]
-    lam: Float[np.ndarray, "m t j"]
-    te2: Float[np.ndarray, "m t j"]
-    slope: SlopeProducts | None = None
+    ee: Float[np.ndarray, " m"]
+    eu: Float[np.ndarray, " m"]
+    uu: Float[np.ndarray, " m"]
+    te: Float[np.ndarray, "m j"]
+    tu: Float[np.ndarray, "m j"]
+    square: Float[np.ndarray, "m j"]
 
 
 class Items(NamedTuple):
@@ -63,33 +51,54 @@ class Items(NamedTuple):
         log_evidence: log marginal likelihood, with a prior weight where one is stated.
         mean: of the amplitude given the noise sd, before its bounds.
         sd: of the amplitude, likewise.
-        noise_sd: the likeliest noise sd.
     """
 
     log_evidence: Float[np.ndarray, "m t"]
     mean: Float[np.ndarray, "m t"]
     sd: Float[np.ndarray, "m t"]
-    noise_sd: Float[np.ndarray, "m t"]
 
 
 class _Given(NamedTuple):
-    """What is left at a noise variance when the loose columns are integrated out."""
+    """What is left at a noise variance when the loose columns are integrated out.
+
+    `used` is the number of rows that they use up.
+    """
 
     log_det: np.ndarray
     ee: np.ndarray
     eu: np.ndarray
     uu: np.ndarray
+    used: np.ndarray
 
 
-def _given(variance, products: Products) -> _Given:
-    inside = variance[..., None] + products.lam
-    log_det = np.sum(np.log(inside / variance[..., None]), axis=-1)
-    ee = products.ee - np.sum(products.te2 / inside, axis=-1)
-    if products.slope is None:
-        return _Given(log_det, ee, np.zeros(()), np.zeros(()))
-    eu, uu, teu, tu2 = products.slope
-    eu = eu - np.sum(teu / inside, axis=-1)
-    return _Given(log_det, ee, eu, uu - np.sum(tu2 / inside, axis=-1))
+class _Loose:
+    """The loose columns of items, at prior variances of their coefficients.
+
+    Attributes:
+        products: of the items.
+        lam: prior variance times squared length of each axis, shape (m, t, j).
+    """
+
+    def __init__(self, products: Products, variance: Float[np.ndarray, "m t"]):
+        self.products, self.variance = products, variance[..., None]
+        self.lam = self.variance * products.square[:, None]
+        te, tu = products.te, products.tu
+        self._pairs = np.stack([te**2, te * tu, tu**2, products.square], axis=1)
+
+    def given(self, noise: Float[np.ndarray, "*k m t"]) -> _Given:
+        """Return what is left at noise variances."""
+        inside = noise[..., None] + self.lam
+        log_det = np.sum(np.log(inside / noise[..., None]), axis=-1)
+        taken = self._pairs @ np.swapaxes(self.variance / inside, -1, -2)
+        ee, eu, uu, used = np.moveaxis(taken, -2, 0)
+        products = self.products
+        return _Given(
+            log_det,
+            products.ee[:, None] - ee,
+            products.eu[:, None] - eu,
+            products.uu[:, None] - uu,
+            used,
+        )
 
 
 class _Amplitude(NamedTuple):
@@ -107,63 +116,66 @@ def _amplitude(given: _Given, variance, prior: Amplitudes) -> _Amplitude:
 
 
 def log_marginal(
-    count: int, products: Products, prior: Amplitudes | None, sigma: Any
+    count: int,
+    products: Products,
+    variance: Float[np.ndarray, "m t"],
+    prior: Amplitudes | None,
+    sigma: Any,
 ) -> Items:
     """Return the log marginal likelihood of each item.
 
     Args:
         count: number of rows.
         products: inner products of the items.
+        variance: prior variances of the coefficients of their loose columns.
         prior: of their amplitudes, each of shape (m,); None without a slope.
         sigma: frozen distribution of the noise sd [N].
     """
     if not products.ee.size:
-        return Items(*4 * [products.ee])
+        return Items(*3 * [np.zeros(variance.shape)])
     if prior is not None:
         prior = Amplitudes(*(column[:, None] for column in prior))
-    variance = _likeliest_variance(count, products, prior)
-    centre = 0.5 * np.log(variance)
+    loose = _Loose(products, variance)
+    noise = _likeliest_variance(count, loose, prior)
+    centre = 0.5 * np.log(noise)
     width = _WIDER / np.sqrt(2.0 * max(count - 4.0, 2.0))
     reach = _REACH * width
     grid = np.linspace(centre.min() - reach, centre.max() + reach, _POINTS)
     log_prior = sigma.logpdf(np.exp(grid)) + grid
-    total = []
-    for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-        log_sd = centre + np.sqrt(2.0) * width * node
-        value = _log_density(count, log_sd, products, prior)
-        value = value + np.interp(log_sd, grid, log_prior)
-        total.append(value + np.log(weight) + node**2)
-    log_evidence = np.logaddexp.reduce(total, axis=0)
+    nodes = _NODES[:, None, None]
+    log_sd = centre + np.sqrt(2.0) * width * nodes
+    value = _log_density(count, log_sd, loose, prior)
+    value += np.interp(log_sd, grid, log_prior)
+    value += np.log(_WEIGHTS)[:, None, None] + nodes**2
+    log_evidence = np.logaddexp.reduce(value, axis=0)
     log_evidence += 0.5 * np.log(2.0 * width**2) - 0.5 * count * _LOG_2PI
-    noise_sd = np.exp(centre)
     if prior is None:
         none = np.zeros_like(centre)
-        return Items(log_evidence, none, none, noise_sd)
-    found = _amplitude(_given(variance, products), variance, prior)
-    return Items(log_evidence, found.mean, found.precision**-0.5, noise_sd)
+        return Items(log_evidence, none, none)
+    found = _amplitude(loose.given(noise), noise, prior)
+    return Items(log_evidence, found.mean, found.precision**-0.5)
 
 
-def _likeliest_variance(count: int, products: Products, prior: Amplitudes | None):
+def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes | None):
     """Return the noise variance at which the likelihood is largest, approximately."""
-    shape = np.broadcast_shapes(products.ee.shape, products.lam.shape[:-1])
-    variance = np.broadcast_to(products.ee / count, shape)
+    square = loose.products.ee[:, None]
+    variance = np.broadcast_to(square / count, loose.lam.shape[:-1])
     for _ in range(_STEPS):
-        given = _given(variance, products)
+        given = loose.given(variance)
         left = given.ee
         if prior is not None:
             size = _amplitude(given, variance, prior).mean
             size = np.clip(size, prior.low, prior.high)
             left = left - 2.0 * size * given.eu + size**2 * given.uu
-        used = products.lam / (variance[..., None] + products.lam)
-        free = np.maximum(count - np.sum(used, axis=-1), 1.0)
-        variance = np.maximum(left, 1e-9 * products.ee) / free
+        free = np.maximum(count - given.used, 1.0)
+        variance = np.maximum(left, 1e-9 * square) / free
     return variance
 
 
-def _log_density(count: int, log_sd, products: Products, prior: Amplitudes | None):
+def _log_density(count: int, log_sd, loose: _Loose, prior: Amplitudes | None):
     """Return the log density of the readings given the noise sd, less log 2π terms."""
     variance = np.exp(2.0 * log_sd)
-    given = _given(variance, products)
+    given = loose.given(variance)
     value = -count * log_sd - 0.5 * given.log_det - 0.5 * given.ee / variance
     if prior is None:
         return value

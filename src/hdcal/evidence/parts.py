@@ -145,6 +145,8 @@ def log_sign_probability(
     Parts of a context are Gaussian without bounds. The change of this probability by
     another component restores the bounds.
     """
+    if not any(part.one_sided for part in parts):
+        return 0.0
     found, total = posterior(problem, noise, parts), 0.0
     for part, place in zip(parts, coefficients(problem, parts), strict=True):
         if part.one_sided:

@@ -1,16 +1,60 @@
 """Inner products of whitened curves beside the base and a context."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.evidence.marginal import Products, log_marginal
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context
 from hdcal.inference.serial_correlation import log_volume
+
+
+class Axes(NamedTuple):
+    """Principal axes of columns beside the base.
+
+    Attributes:
+        square: their squared lengths, shape (s, j).
+        rotation: from the columns to the axes, shape (s, j, j).
+        inside: products of the columns with what the base spans, shape (s, j, p).
+        along_y: products of the columns with the readings, base included, (s, j).
+    """
+
+    square: Float[np.ndarray, "s j"]
+    rotation: Float[np.ndarray, "s j j"]
+    inside: Float[np.ndarray, "s j p"]
+    along_y: Float[np.ndarray, "s j"]
+
+    def products(
+        self, along: Float[np.ndarray, "s j"], base: Float[np.ndarray, "s p"]
+    ) -> Float[np.ndarray, "s j"]:
+        """Return products of the axes, at their lengths, with a curve for each space.
+
+        Args:
+            along: products of the columns with the curves, base included.
+            base: products of the curves with what the base spans.
+        """
+        left = along - np.einsum("sjp,sp->sj", self.inside, base)
+        return np.einsum("sj,sjk->sk", left, self.rotation)
+
+
+class Curves(NamedTuple):
+    """Products of whitened errors and slopes.
+
+    Attributes:
+        ee: of error and error beside the base, shape (m,).
+        eu: of error and slope, likewise.
+        uu: of slope and slope, likewise.
+        error_q: of errors and what the base spans, shape (m, p).
+        slope_q: of slopes and what the base spans, likewise.
+    """
+
+    ee: Float[np.ndarray, " m"]
+    eu: Float[np.ndarray, " m"]
+    uu: Float[np.ndarray, " m"]
+    error_q: Float[np.ndarray, "m p"]
+    slope_q: Float[np.ndarray, "m p"]
 
 
 class Projection:
@@ -21,6 +65,7 @@ class Projection:
         noise: model of the noise.
         q: what the base spans, above its priors, shape (n, p).
         y: whitened readings, less the context's offset, shape (n,).
+        y_q: their products with q, shape (p,).
         square: their square beside the base.
         constant: part of every log evidence: priors and volume of the whitening.
     """
@@ -33,8 +78,8 @@ class Projection:
         q, r = np.linalg.qr(stacked)
         self.q = q[: len(problem.y)]
         self.y = self.whiten(problem.y - context.offset)
-        along = self.y @ self.q
-        self.square = float(self.y @ self.y - along @ along)
+        self.y_q = self.y @ self.q
+        self.square = float(self.y @ self.y - self.y_q @ self.y_q)
         volume = log_volume(np.sum(problem.before >= 0), noise.correlation)
         log_det = np.sum(np.log(np.abs(np.diag(r)))) - np.sum(np.log(held))
         counting = noise.weight[noise.weight > 0.0]
@@ -45,65 +90,38 @@ class Projection:
         """Return curves, rows last, in which the noise is independent."""
         return self.problem.whiten(curves, self.noise.weight, self.noise.correlation)
 
-    def products(self, error, slope) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return products of whitened errors and slopes (m, n) beside the base.
-
-        Returns:
-            Error with error, error with slope and slope with slope, each (m, 1).
-        """
-        error_q, slope_q = error @ self.q, slope @ self.q
+    def curves(
+        self, offset: Float[np.ndarray, "m n"], slope: Float[np.ndarray, "m n"]
+    ) -> "Curves":
+        """Return products of the errors, the readings less offsets, and of slopes."""
+        error = self.y - offset
+        error_q, slope_q = self.y_q - offset @ self.q, slope @ self.q
 
         def product(a, b, a_q, b_q):
-            return (np.sum(a * b, axis=1) - np.sum(a_q * b_q, axis=1))[:, None]
+            return np.einsum("mn,mn->m", a, b) - np.einsum("mp,mp->m", a_q, b_q)
 
-        return (
+        return Curves(
             product(error, error, error_q, error_q),
             product(error, slope, error_q, slope_q),
             product(slope, slope, slope_q, slope_q),
+            error_q,
+            slope_q,
         )
 
-    def evidence_of_none(self) -> float:
-        """Return the log evidence of base and context alone."""
-        none = np.zeros((1, 1, 0))
-        products = Products(np.full((1, 1), self.square), none, none)
-        found = log_marginal(
-            self.problem.count, products, None, self.problem.noise_prior
-        )
-        return float(found.log_evidence[0, 0]) + self.constant
+    def axes(
+        self, white: Float[np.ndarray, "s j n"], gram: Float[np.ndarray, "s j j"]
+    ) -> Axes:
+        """Return the principal axes of whitened columns.
 
-
-class Axes(NamedTuple):
-    """Principal axes of columns beside the base.
-
-    Attributes:
-        square: their squared lengths, shape (s, j).
-        products: of the axes, at these lengths, with each of some curves, (s, j).
-    """
-
-    square: Float[np.ndarray, "s j"]
-    products: list[Float[np.ndarray, "s j"]]
-
-
-def principal_axes(
-    projection: Projection,
-    white: Float[np.ndarray, "s j n"],
-    gram: Float[np.ndarray, "s j j"],
-    curves: Sequence[Float[np.ndarray, "s n"]],
-) -> Axes:
-    """Return the principal axes of whitened columns.
-
-    Args:
-        projection: base, context and noise.
-        white: whitened columns.
-        gram: their inner products, base included.
-        curves: whitened curves of which products are wanted.
-    """
-    inside = white @ projection.q
-    left = gram - inside @ np.swapaxes(inside, 1, 2)
-    square, rotation = np.linalg.eigh(left)
-    products = []
-    for curve in curves:
-        along = np.einsum("sjn,sn->sj", white, curve)
-        along -= np.einsum("sjp,sp->sj", inside, curve @ projection.q)
-        products.append(np.einsum("sj,sjk->sk", along, rotation))
-    return Axes(np.maximum(square, 0.0), products)
+        Args:
+            white: the columns.
+            gram: their inner products, base included.
+        """
+        flat = white.reshape(-1, white.shape[-1])
+        # Through all columns once: of many rows they take longer to read than to use.
+        found = flat @ np.column_stack([self.q, self.y])
+        found = found.reshape(*white.shape[:-1], found.shape[1])
+        inside = found[..., :-1]
+        left = gram - inside @ np.swapaxes(inside, 1, 2)
+        square, rotation = np.linalg.eigh(left)
+        return Axes(np.maximum(square, 0.0), rotation, inside, found[..., -1])

@@ -173,16 +173,20 @@ class _Search:
         ]
 
     def evaluate(
-        self, columns: Sequence[int], parts: Sequence[Part]
+        self,
+        columns: Sequence[int],
+        parts: Sequence[Part],
+        only: set[int] | None = None,
     ) -> dict[int, Evaluated]:
         """Evaluate everything beside some parts under several models of the noise."""
-        context = join(self.problem, parts)
-        beside = self.problem.with_columns(context.offset, context.columns)
-        local = likeliest_members(beside, self.families, self.outside)
-        local = self._sharing(local)
+        context, local = join(self.problem, parts), []
+        if only is None or self.outside in only:
+            beside = self.problem.with_columns(context.offset, context.columns)
+            local = likeliest_members(beside, self.families, self.outside)
+            local = self._sharing(local)
+        noises, evaluate = self.table.noises, self.selection.evaluate
         return {
-            column: self.selection.evaluate(self.table.noises[column], context, local)
-            for column in columns
+            column: evaluate(noises[column], context, local, only) for column in columns
         }
 
     def alone(self, columns: Sequence[int]) -> None:
@@ -207,7 +211,7 @@ class _Search:
         correlation = float(problem.correlations[likeliest])
         more = growing_noise(problem, correlation) if GROWING in library else []
         if OUTLIERS in library:
-            for key in {(), table.ranked()[0]}:
+            for key in dict.fromkeys([(), table.ranked()[0]]):
                 parts = table.parts[key]
 
                 def fitted(weight, parts=parts):
@@ -259,7 +263,7 @@ class _Search:
         """
         table, problem = self.table, self.problem
         key = tuple(sorted(table.names[part.component] for part in parts))
-        for column, found in self.evaluate(columns, parts).items():
+        for column, found in self.evaluate(columns, parts, only).items():
             noise = table.noises[column]
             signs = log_sign_probability(problem, noise, parts)
             gain = found.totals() - found.none
@@ -269,7 +273,7 @@ class _Search:
             for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
                 names = (*key, table.names[k])
                 many = len(names) - (OUTSIDE in names) > 2
-                if table.names[k] in key or many or (only and k not in only):
+                if table.names[k] in key or many:
                     continue
                 both = [*parts, found.likeliest(int(k))]
                 change = log_sign_probability(problem, noise, both) - signs

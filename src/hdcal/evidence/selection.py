@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.evidence.components import Atoms, Components, Space
 from hdcal.evidence.evaluation import Selection
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.evidence.marginal import Items, Products, SlopeProducts, log_marginal
+from hdcal.evidence.marginal import Items, Products, log_marginal
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context
 from hdcal.evidence.projection import Projection
@@ -64,10 +64,12 @@ def select(
 def _alone(projection: Projection, atoms: Atoms) -> Items:
     """Return the evidence of atoms whose shapes do not deviate."""
     problem = projection.problem
-    error = projection.y - projection.whiten(atoms.offset)
-    ee, eu, uu = projection.products(error, projection.whiten(atoms.slope))
-    none = np.zeros((len(error), 1, 0))
-    products = Products(ee, none, none, SlopeProducts(eu, uu, none, none))
-    found = log_marginal(problem.count, products, atoms.amplitude, problem.noise_prior)
+    curves = projection.curves(*map(projection.whiten, (atoms.offset, atoms.slope)))
+    none, single = np.zeros((len(atoms.owner), 0)), np.zeros((len(atoms.owner), 1))
+    ee, eu, uu = (each[atoms.curve] for each in curves[:3])
+    products = Products(ee, eu, uu, none, none, none)
+    found = log_marginal(
+        problem.count, products, single, atoms.amplitude, problem.noise_prior
+    )
     weight = atoms.log_weight[:, None] + projection.constant
     return found._replace(log_evidence=found.log_evidence + weight)

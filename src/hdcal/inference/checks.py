@@ -6,15 +6,17 @@ the reader must know.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, MAX_TREE_DEPTH, Mixing
 from hdcal.inference.distributions import frozen
-from hdcal.inference.sample import MAX_TREE_DEPTH, Draws
 from hdcal.inference.serial_correlation import CORRELATION, worth
+
+if TYPE_CHECKING:
+    from hdcal.inference.sample import Draws
 
 INDEPENDENT = "neighbouring readings err independently"
 PLAUSIBLE = "prior and data agree"
@@ -53,7 +55,7 @@ def _check(name: str, passed: bool, words: str) -> Check:
     return Check(name, "passed" if passed else "failed", words)
 
 
-def sampling_checks(draws: Draws, mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
+def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
     """Return the checks on the sampler: any of them failed fails the result.
 
     Args:

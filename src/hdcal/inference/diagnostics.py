@@ -12,6 +12,8 @@ from hdcal.inference.distributions import moments
 
 # Limits of chains that have mixed: the largest R-hat, the smallest ESS of each chain.
 MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
+# Doublings of a trajectory.
+MAX_TREE_DEPTH = 10
 # Probability of ArviZ' default interval, for the ends of which the tail ESS is.
 _TAIL = 0.89
 # Share of the prior variance that the data must remove to decide a parameter; the

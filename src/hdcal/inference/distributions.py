@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -47,11 +48,17 @@ def frozen(prior: Prior, name: str = "") -> Any:
     Raises:
         ValueError: the family has none, such as a fixed value.
     """
+    return _frozen(prior.family, (*map(float, prior.numbers),), name in POSITIVE)
+
+
+# A SciPy distribution takes longer to make than to evaluate.
+@lru_cache(maxsize=1024)
+def _frozen(family: str, numbers: tuple[float, ...], positive: bool) -> Any:
     from scipy import stats
 
-    first, second = (*map(float, prior.numbers), math.nan)[:2]
-    match prior.family:
-        case "normal" if name in POSITIVE:
+    first, second = (*numbers, math.nan)[:2]
+    match family:
+        case "normal" if positive:
             return stats.truncnorm(-first / second, math.inf, first, second)
         case "normal":
             return stats.norm(first, second)
@@ -63,15 +70,20 @@ def frozen(prior: Prior, name: str = "") -> Any:
             return stats.uniform(first, second - first)
         case "beta":
             return stats.beta(first, second)
-    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+    raise ValueError(f"no distribution for the prior family {family!r}")
 
 
 def moments(prior: Prior, name: str = "") -> tuple[float, float]:
     """Return mean and sd of the prior of a parameter; the sd of a fixed one is 0."""
     if prior.family == "fixed":
         return float(prior.numbers[0]), 0.0
-    scipy_prior = frozen(prior, name)
-    return float(scipy_prior.mean()), float(scipy_prior.std())
+    return _moments(prior.family, (*map(float, prior.numbers),), name in POSITIVE)
+
+
+@lru_cache(maxsize=1024)
+def _moments(family: str, numbers: tuple[float, ...], positive: bool):
+    found = _frozen(family, numbers, positive)
+    return float(found.mean()), float(found.std())
 
 
 def sample_prior(

@@ -16,7 +16,7 @@ from numpyro.infer.hmc import hmc
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.exported import jit
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_TREE_DEPTH, have_mixed
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.marginal import draw_members
 from hdcal.inference.sampled_problem import Sampled
@@ -24,7 +24,6 @@ from hdcal.inference.sampled_problem import Sampled
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
 
-MAX_TREE_DEPTH = 10
 # Mean acceptance aimed at; each further value is for a run with divergences.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.calibration.calibrate import check_effect_priors
+from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
 from hdcal.data.case import Case, require_force
