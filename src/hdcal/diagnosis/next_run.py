@@ -161,6 +161,7 @@ def _on_runs(
 ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, "r j m"]]:
     """Return offset and columns of a part on each run, history included."""
     selection, problem = searched.selection, searched.problem
+    assert part.place is not None
     effect = searched.predicting.effects[selection.names[part.component]]
     if np.any(selection.atoms.owner == part.component):
         atom = selection.atoms.pick(np.array([part.place.row]))

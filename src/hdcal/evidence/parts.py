@@ -42,7 +42,7 @@ class Part(NamedTuple):
         sd: of a, likewise.
         loose: columns of the shape's tolerance [N per sd], shape (l, n).
         one_sided: whether a is not negative.
-        place: of the item.
+        place: of the item; None where the part is several.
         spread: log evidence of the component less that of the item, where it was found.
         levels: probability of each tolerance of the shape, with its loose columns.
     """
@@ -54,7 +54,7 @@ class Part(NamedTuple):
     sd: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
     one_sided: bool
-    place: Place
+    place: Place | None
     spread: float
     levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
 
@@ -72,6 +72,15 @@ class Part(NamedTuple):
         """Return the part as one of the base."""
         columns = np.concatenate([self.sd[:, None] * self.columns, self.loose])
         return Context(self.offset + self.mean @ self.columns, columns)
+
+
+def merged(parts: Sequence[Part]) -> Part:
+    """Return several items of one component as one part; their offsets are zero."""
+    columns, mean, sd = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("columns", "mean", "sd")
+    )
+    return parts[0]._replace(columns=columns, mean=mean, sd=sd, place=None)
 
 
 class Curves(NamedTuple):

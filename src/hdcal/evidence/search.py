@@ -26,7 +26,13 @@ from hdcal.evidence.noise_models import (
     growing_noise,
     outliers,
 )
-from hdcal.evidence.parts import Part, join, log_sign_probability, posterior
+from hdcal.evidence.parts import (
+    Part,
+    join,
+    log_sign_probability,
+    merged,
+    posterior,
+)
 from hdcal.evidence.remainder import kernels
 from hdcal.evidence.selection import select
 from hdcal.evidence.table import OUTSIDE, Names, Table
@@ -44,6 +50,8 @@ _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
 # cycle.
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
+# Most kernels of a remainder, and prior odds of one more.
+_MOST_KERNELS, _ONE_MORE = 4, 0.25
 # Kernels and local families that share the prior of the remainder, at least.
 _LEAST_SHARING = 15
 
@@ -235,6 +243,7 @@ class _Search:
         leading = table.ranked(1)[:_CONTEXTS]
         if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
             leading[-1] = (OUTSIDE,)
+        self._grow((OUTSIDE,), columns)
         for key in leading:
             self._beside(table.parts[key], columns)
         for _ in range(_TIMES):
@@ -243,6 +252,35 @@ class _Search:
         for key in table.ranked(2)[:_REFINED]:
             if OUTSIDE not in key:
                 self._beside(table.parts[key], columns, {self.outside})
+        beside = [key for key in table.ranked() if OUTSIDE in key and len(key) > 1]
+        for key in beside[:_REFINED]:
+            self._grow(key, columns[:1])
+
+    def _grow(self, key: Names, columns: Sequence[int]) -> None:
+        """Add kernels to the remainder of a hypothesis while the readings ask for more.
+
+        Args:
+            key: the hypothesis.
+            columns: indices of the models of the noise.
+        """
+        table = self.table
+        for _ in range(_MOST_KERNELS - 1):
+            parts, before = table.parts[key], table.log_evidence[key].max()
+            others = [part for part in parts if part.component != self.outside]
+            own = [part for part in parts if part.component == self.outside]
+            for column, found in self.evaluate(columns, parts, {self.outside}).items():
+                gain = found.totals()[self.outside] - found.none + np.log(_ONE_MORE)
+                more = [*others, merged([*own, found.likeliest(self.outside)])]
+                noise = table.noises[column]
+                before_signs, signs = (
+                    log_sign_probability(self.problem, noise, each)
+                    for each in (parts, more)
+                )
+                gain += min(signs - before_signs, 0.0)
+                value = float(table.log_evidence[key][column] + gain)
+                table.put(key, column, value, lambda more=more: more)
+            if table.log_evidence[key].max() <= before:
+                return
 
     def _refine(self, key: Names, columns: Sequence[int]) -> None:
         """Evaluate each member of a pair beside the best item of the other one."""
@@ -268,7 +306,7 @@ class _Search:
             signs = log_sign_probability(problem, noise, parts)
             gain = found.totals() - found.none
             start = table.log_evidence[key][column]
-            if len(parts) == 1:
+            if len(parts) == 1 and parts[0].place is not None:
                 start = self.found_alone[column].of_part(parts[0])
             for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
                 names = (*key, table.names[k])
