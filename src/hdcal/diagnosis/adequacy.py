@@ -7,8 +7,6 @@ from hdcal.evidence.search import Searched
 from hdcal.evidence.table import Names
 
 _DRAWS = 300
-# Factor of the prior sds that makes a remainder free.
-_FREE = 100.0
 
 
 def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -> float:
@@ -26,13 +24,7 @@ def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -
     if not searched.kernels:
         return 1.0
     noise = table.likeliest_noise(key)
-    outside = len(table.names) - 1
-    # Fitted freely, a remainder leaves nothing of what it can describe.
-    parts = [
-        part._replace(sd=_FREE * part.sd) if part.component == outside else part
-        for part in table.parts[key]
-    ]
-    fit = posterior(problem, noise, parts)
+    fit = posterior(problem, noise, table.parts[key])
 
     def white(curves):
         return problem.whiten(curves, noise.weight, noise.correlation)
