@@ -50,6 +50,28 @@ def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
     ]
 
 
+def correlated_noise(
+    problem: LinearProblem, error: Float[np.ndarray, " n"]
+) -> NoiseModel:
+    """Return equal noise with the correlation that errors have.
+
+    Its prior is the mass of a normal around it: uniform over the correlation times the
+    width of its likelihood.
+
+    Args:
+        problem: the case.
+        error: of the rows [N], shape (n,).
+    """
+    follows = problem.before >= 0
+    error = error * problem.weight
+    last = error[problem.before[follows]]
+    found = float(error[follows] @ last / max(last @ last, 1e-300))
+    found = float(np.clip(found, 0.0, problem.correlations[-1]))
+    sd = np.sqrt((1.0 - found**2) / max(np.count_nonzero(follows), 1))
+    log_mass = float(np.log(min(np.sqrt(2.0 * np.pi) * sd, 1.0)))
+    return NoiseModel("", problem.weight, found, log_mass)
+
+
 def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel]:
     """Return noise of variance sd² + (share · force)², on a grid of the share."""
     zero, records = float(problem.base.deformation_offset), problem.records

@@ -22,6 +22,7 @@ from hdcal.evidence.noise_models import (
     GROWING,
     OUTLIERS,
     NoiseModel,
+    correlated_noise,
     equal_noise,
     growing_noise,
     outliers,
@@ -47,6 +48,8 @@ _HOPELESS = 25.0
 _REFINED, _TIMES = 3, 2
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
+# Difference of correlations that are the same.
+_SAME_CORRELATION = 0.01
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
 # cycle.
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
@@ -101,6 +104,7 @@ def search(
         problem = linear_problem(case, library, about, free_runs=free_runs)
         found = _Search(problem, library, found.kernels)
         found.alone(range(len(problem.correlations)))
+    found.fitted_correlations()
     step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
     if not step:
@@ -212,11 +216,25 @@ class _Search:
                         lambda k=k, found=found: [found.likeliest(k)],
                     )
 
+    def fitted_correlations(self) -> None:
+        """Enter everything alone with the correlations that two hypotheses leave.
+
+        In many rows a correlation between two of the grid fits much better than both.
+        """
+        table, problem = self.table, self.problem
+        for key in dict.fromkeys([(), table.ranked()[0]]):
+            fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
+            more = correlated_noise(problem, problem.y - fit.reading)
+            known = np.array([noise.correlation for noise in table.noises])
+            if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
+                table.add_noises([more])
+                self.alone([len(table.noises) - 1])
+
     def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
         """Enter everything alone under the library's models of the noise."""
         table, problem = self.table, self.problem
         likeliest = int(np.argmax(table.noise_probabilities()))
-        correlation = float(problem.correlations[likeliest])
+        correlation = table.noises[likeliest].correlation
         more = growing_noise(problem, correlation) if GROWING in library else []
         if OUTLIERS in library:
             for key in dict.fromkeys([(), table.ranked()[0]]):

@@ -47,13 +47,13 @@ class Table:
         """Return the probability of each hypothesis and model of the noise.
 
         Args:
-            temperature: by which log posterior odds of hypotheses are divided.
+            temperature: by which log evidences of hypotheses are divided.
         """
-        joint = np.stack(
-            [row + self.log_prior(key) for key, row in self.log_evidence.items()]
-        )
-        whole = np.logaddexp.reduce(joint, axis=1, keepdims=True)
-        joint = np.exp((whole - whole.max()) / temperature + joint - whole)
+        table = np.stack([*self.log_evidence.values()])
+        prior = np.array([self.log_prior(key) for key in self.log_evidence])
+        whole = np.logaddexp.reduce(table, axis=1)
+        log_odds = (whole - whole.max()) / temperature + prior
+        joint = np.exp(log_odds[:, None] + table - whole[:, None])
         return dict(zip(self.log_evidence, joint / joint.sum(), strict=True))
 
     def ranked(self, size: int | None = None) -> list[Names]:
