@@ -261,7 +261,8 @@ class _Search:
         leading = table.ranked(1)[:_CONTEXTS]
         if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
             leading[-1] = (OUTSIDE,)
-        self._grow((OUTSIDE,), columns)
+        if (OUTSIDE,) in table.parts:
+            self._grow((OUTSIDE,), columns)
         for key in leading:
             self._beside(table.parts[key], columns)
         for _ in range(_TIMES):
