@@ -123,6 +123,11 @@ def main(arguments: list[str] | None = None) -> None:
     console.prepare()
     _interrupt_once()
     code = _run(given, console)
+    if code == INTERRUPTED:
+        # Threads of XLA that are still at work crash an interpreter that ends by itself.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(NOBODY_READS if code == DONE and console.unread else code)
 
 
