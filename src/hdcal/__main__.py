@@ -123,8 +123,8 @@ def main(arguments: list[str] | None = None) -> None:
     console.prepare()
     _interrupt_once()
     code = _run(given, console)
-    if code == INTERRUPTED:
-        # Threads of XLA that are still at work crash an interpreter that ends by itself.
+    if code == INTERRUPTED and arguments is None:
+        # Threads of XLA that are still at work would crash the end of the interpreter.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

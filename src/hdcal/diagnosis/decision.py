@@ -26,8 +26,8 @@ from hdcal.physics.effect import Effect
 from hdcal.report.item import INTERVAL, Interval
 
 # By which log evidences are divided. On learning rounds of the blind check, 940 cases,
-# the mean log score grows up to 2.0, by 0.05 nat from here. This is the largest value at
-# which four in five causes are still stated with 90 %, of gaps as large as the noise.
+# the mean log score grows up to 2.0, by 0.05 nat from here. Above this value fewer than
+# four in five causes of gaps as large as the noise are stated with 90 %.
 TEMPERATURE = 1.6
 # Probability of the credible set.
 _CREDIBLE = 0.9
