@@ -48,8 +48,8 @@ class Acting:
     def explanations(self) -> dict[Names, float]:
         """Return explanations of the draws and their shares of them.
 
-        An explanation are the effects that act, or `OUTSIDE` where these close less
-        than half of the gap; () is none.
+        An explanation is the set of effects that act, or `OUTSIDE` where these close
+        less than half of the gap; () means that nothing acts.
         """
         effects = [name for name in self.components if name != OUTSIDE]
         noise = [self.noise] if self.noise else []
@@ -105,11 +105,11 @@ def _drawn(
     names = [table.names[part.component] for part in parts]
     curves, own = sampled_curves(problem, noise, parts, _DRAWS, rng)
     # Structure within the rounding of a coarse reading shows nothing.
-    largest = float(np.quantile(np.abs(problem.records.force), 0.99))
+    largest = float(np.max(np.abs(problem.records.force)))
     least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
-    square = np.sum(curves**2, axis=2)
-    shown = square > _SHOWN * problem.noise_sd**2
-    shown &= square > least**2 * curves.shape[2]
+    visible = np.sum((noise.weight * curves) ** 2, axis=2)
+    shown = visible > _SHOWN * problem.noise_sd**2
+    shown &= np.mean(curves**2, axis=2) > least**2
     gaps = np.einsum("kd,kdn->dn", shown, curves)
     # What points away from the gap only makes up for another component.
     shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0

@@ -46,7 +46,6 @@ class Decision:
         explanations: all that are possible, the most probable first.
         hypotheses: probability of each hypothesis on the mean reading and effect on
             the noise.
-        unexcited: effects that lack a loading which would separate them from others.
         coarse_step: step of forces that are read coarsely [N], a fact of the reading
             and no hypothesis; 0 where they are not.
     """
@@ -56,7 +55,6 @@ class Decision:
     which: Which
     explanations: tuple[Explanation, ...]
     hypotheses: Mapping[Names, float]
-    unexcited: Mapping[str, list[str]]
     coarse_step: float
 
 
@@ -104,7 +102,6 @@ def decide_searched(
         which=_which(searched, found, causes, explanations, gap, p_value),
         explanations=explanations,
         hypotheses=_hypotheses(searched, posterior),
-        unexcited=searched.predicting.unexcited,
         coarse_step=searched.coarse_step,
     )
 
@@ -147,9 +144,11 @@ def _verdict(
     """
     if gap <= LIKELY:
         return "none"
-    acting = [c for c in causes if c.probability > LIKELY and c.explains is not None]
+    likely = [cause for cause in causes if cause.probability > LIKELY]
+    acting = [cause for cause in likely if not cause.on_noise]
     if not acting and outside.probability > LIKELY:
         return "unknown"
+    acting = acting or likely
     if not acting or acting[0].probability < NAMED or not fits:
         return "ambiguous"
     return "group" if acting[0].merged else "named"

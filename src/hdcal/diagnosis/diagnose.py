@@ -76,12 +76,13 @@ def diagnose(
     searched = search(case, effects)
     found = decide_searched(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
-    names = [cause.members[0] for cause in found.which.acting if cause.explains]
+    names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
     calibrated = case if quick else rows_to_calibrate(case)
     fits = refit(calibrated, found.hypotheses, effects, seed, progress, quick=quick)
     largest = float(np.max(np.abs(case.records.force)))
-    size = found.gap_N if found.gap > LIKELY else None
+    on_mean = names or found.which.outside.probability > LIKELY
+    size = found.gap_N if on_mean else None
     return Diagnosis(
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,

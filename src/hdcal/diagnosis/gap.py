@@ -69,7 +69,7 @@ def gap_by_row(
             draws.append(np.zeros((count, len(problem.y))))
         elif count:
             curves = sampled_curves(problem, noise, parts, int(count), rng)
-            draws.append(curves.whole.sum(axis=0) / noise.weight)
+            draws.append(curves.whole.sum(axis=0))
     # The gap is projected in the same way, so that it lies among the residuals.
     residual = problem.project(problem.y)
     return GapByRow(problem.records, residual, np.concatenate(draws))
@@ -80,7 +80,7 @@ def fitted(
     posterior_of: Mapping[Names, np.ndarray],
     names: Sequence[str],
 ) -> Fitted:
-    """Return the likeliest hypothesis that holds some effects.
+    """Return the likeliest of the hypotheses that hold most of some effects.
 
     Args:
         searched: hypotheses of the case.
@@ -88,8 +88,11 @@ def fitted(
         names: of the effects on the mean reading; some of a hypothesis.
     """
     problem, table = searched.problem, searched.table
-    holding = [key for key in posterior_of if {*names} <= {*key}]
-    key = max(holding, key=lambda each: posterior_of[each].sum())
+    # A hypothesis holds two effects at most, and more may act.
+    key = max(
+        posterior_of,
+        key=lambda each: (len({*names} & {*each}), posterior_of[each].sum()),
+    )
     noise, parts = table.likeliest_noise(key), table.parts[key]
     by_name = {table.names[part.component]: part for part in parts}
     rms, added = {"": _rms(searched, noise, [])}, []

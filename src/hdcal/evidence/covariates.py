@@ -37,12 +37,10 @@ class Predicting:
     Attributes:
         effects: those that predict something for these rows, by name.
         lacking: columns that each of the others needs and that were not measured.
-        unexcited: features of the loading that effects lack which do predict.
     """
 
     effects: dict[str, type[Effect]]
     lacking: dict[str, list[str]]
-    unexcited: dict[str, list[str]]
 
 
 def predicting(library: Mapping[str, type[Effect]], records: Records) -> Predicting:
@@ -58,8 +56,7 @@ def predicting(library: Mapping[str, type[Effect]], records: Records) -> Predict
         if (missing := [column for column in found if column not in records.known])
     }
     effects = {n: effect for n, effect in library.items() if n not in lacking}
-    unexcited = {n: sorted(needed[n]) for n in effects if needed[n]}
-    return Predicting(effects, lacking, unexcited)
+    return Predicting(effects, lacking)
 
 
 def half_cycle_rows(records: Records) -> float:

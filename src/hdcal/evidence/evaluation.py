@@ -288,7 +288,7 @@ class Evaluated:
             mean=size,
             sd=np.maximum(np.abs(size), self.atoms.sd[place]),
             loose=levels[place.column][1],
-            one_sided=bool(low.min() == 0.0),
+            one_sided=bool(low.min() >= 0.0),
             place=place,
             spread=spread,
             levels=levels,

@@ -10,24 +10,19 @@ from hdcal.evidence.row_features import half_cycles, take_rows
 
 # Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
 MOST_ROWS = 10_000
-# Share of the longest travel of a half cycle from which on one shows a loop.
-_FAR = 0.5
 _AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
 
 
-def average_rows(case: Case, most: int) -> tuple[Case, int]:
+def average_rows(case: Case, most: int) -> Case:
     """Average neighbouring rows of a half cycle until few enough are left.
 
     Args:
         case: with rows in the order they were taken.
         most: about as many rows may be left.
-
-    Returns:
-        The case, and how many rows went into each mean; 1 leaves it as it is.
     """
     group = int(np.ceil(len(case.records.force) / most))
     if group == 1:
-        return case, 1
+        return case
     records = _run_after_run(case)
     half = half_cycles(records)
     new = _place(half) % group == 0
@@ -40,15 +35,14 @@ def average_rows(case: Case, most: int) -> tuple[Case, int]:
     known = np.bincount(member, np.asarray(records.force_sd) ** 2) / count
     short = take_rows(records, np.flatnonzero(new))
     short = replace(short, **means, force_sd=np.sqrt(known / count))
-    return replace(case, records=short), group
+    return replace(case, records=short)
 
 
 def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     """Keep one row of so many in each run, the first one among them.
 
-    What is left of an AR(1) series is one, of the coefficient's power: means of it are
-    none, so that where neighbours err much alike rows are left out, not averaged.
-    Then as many rows lie between any two that are left, and turns are not looked at.
+    A thinned AR(1) series is AR(1) with its coefficient to the power of the step; means
+    of neighbours are not. Without `turns` the rows that are left are evenly spaced.
 
     Args:
         case: with rows in the order they were taken.
@@ -62,21 +56,6 @@ def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     last = np.diff(label, append=label[-1] + 1) != 0
     kept = np.flatnonzero((_place(label) % step == 0) | (turns & last))
     return replace(case, records=take_rows(records, kept))
-
-
-def rows_of_half_cycle(case: Case) -> int:
-    """Return how many rows the half cycle has in which the median row lies.
-
-    Of those that go at least half as far as the farthest: others show no loop.
-    """
-    records = _run_after_run(case)
-    half, deformation = half_cycles(records), np.asarray(records.deformation)
-    begin = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
-    ends = [np.ufunc.reduceat(f, deformation, begin) for f in (np.minimum, np.maximum)]
-    travel = ends[1] - ends[0]
-    rows = np.sort(np.bincount(half - half[0])[travel >= _FAR * travel.max()])
-    total = np.cumsum(rows)
-    return int(rows[np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _run_after_run(case: Case) -> Records:

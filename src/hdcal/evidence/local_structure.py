@@ -1,7 +1,7 @@
 """Local structure outside the library: one stretch of rows, or one period.
 
-Of each family of directions the likeliest member takes part, with the prior of one
-among all of them.
+Each family of directions enters with its likeliest member, whose prior is divided by
+the size of the family.
 """
 
 import numpy as np

@@ -84,7 +84,7 @@ def merged(parts: Sequence[Part]) -> Part:
 
 
 class Curves(NamedTuple):
-    """Draws of what the base model leaves of each part, rows weighted by their noise.
+    """Draws of what the base model leaves of each part [N].
 
     Attributes:
         whole: the part, the deviation of its shape included, shape (k, d, n).
@@ -208,7 +208,7 @@ def _drawn(
         values = draws[:, place]
         if part.one_sided:
             values[:, 0] = np.maximum(values[:, 0], part.least)
-        offset, columns = (problem.project(e) * noise.weight for e in part.context())
+        offset, columns = (problem.project(each) for each in part.context())
         size = len(part.columns)
         own.append(offset + values[:, :size] @ columns[:size])
         whole.append(own[-1] + values[:, size:] @ columns[size:])

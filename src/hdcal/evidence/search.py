@@ -1,4 +1,4 @@
-"""The search over hypotheses: alone, beside the likeliest, pairs beside a remainder.
+"""The search over hypotheses: single components, pairs, and both with a remainder.
 
 Everything is evaluated alone under every model of the noise. Then the most probable
 components become contexts, one after the other, beside which everything is evaluated
@@ -93,7 +93,7 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case, _ = average_rows(with_coarse_step(case), MOST_ROWS)
+    case = average_rows(with_coarse_step(case), MOST_ROWS)
     problem = linear_problem(case, library, free_runs=free_runs)
     found = _Search(problem, library)
     found.alone(range(len(problem.correlations)))
@@ -134,7 +134,7 @@ def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
     found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
     # The first coefficient is the deviation of the log stiffness from its prior mean.
     deviation = problem.log_shift + problem.log_sd * found.mean[0]
-    # Of the base model the rows at one temperature determine all but one parameter.
+    # Of the zeros of both channels the rows determine one.
     used = problem.X.shape[1] - 1 + sum(len(part.columns) for part in parts)
     free = len(problem.y) - used
     if free < 1:
@@ -327,10 +327,11 @@ class _Search:
             start = table.log_evidence[key][column]
             if len(parts) == 1 and parts[0].place is not None:
                 start = self.found_alone[column].of_part(parts[0])
+            gain[[table.names.index(name) for name in key]] = -np.inf
             for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
                 names = (*key, table.names[k])
                 many = len(names) - (OUTSIDE in names) > 2
-                if table.names[k] in key or many:
+                if many:
                     continue
                 both = [*parts, found.likeliest(int(k))]
                 change = log_sign_probability(problem, noise, both) - signs
