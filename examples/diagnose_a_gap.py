@@ -44,13 +44,13 @@ def main() -> None:
     found = hdcal.diagnose(case, library=library, quick=True)
     print(found.headline)
     print(found.to_frame())
-    assert found.which.effects["warm_friction"] > 0.9
+    assert found.which.inclusion["warm_friction"] > 0.9
 
     # A prior for an effect that is not in the library would be refused.
     without = hdcal.diagnose(
         replace(case, gear=replace(gear, effect_priors={})), quick=True
     )
-    assert "warm_friction" not in without.which.effects
+    assert "warm_friction" not in without.which.inclusion
     print("without it in the library:", without.headline)
 
 

@@ -30,7 +30,7 @@ def answer_of(case: str, found: Decision, library: Library) -> Answer:
     plain = COARSE if coarse else NONE
     chances = {_text(e, plain): e.probability for e in found.explanations}
     classes = [_cause(each.members, each) for each in acts.causes]
-    inclusion = {name: acts.effects.get(name, 0.0) for name in library}
+    inclusion = {name: acts.inclusion.get(name, 0.0) for name in library}
     if coarse:
         inclusion[COARSE] = chances.get(COARSE, 0.0)
         classes.append(Cause((COARSE,), inclusion[COARSE]))
@@ -38,7 +38,7 @@ def answer_of(case: str, found: Decision, library: Library) -> Answer:
         case=case,
         gap=1.0 if coarse else found.gap,
         explanations=chances,
-        set=tuple(_text(each, plain) for each in acts.set),
+        set=tuple(_text(each, plain) for each in acts.explanations),
         inclusion=inclusion,
         classes=tuple(classes),
         outside=_cause((OUTSIDE,), acts.outside),

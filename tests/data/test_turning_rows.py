@@ -56,8 +56,8 @@ def test_the_diagnosis_is_the_same_on_either_side():
     ]
     for each in found:
         assert each.which.causes[0].members[0] == "coulomb_friction"
-        assert each.which.effects["coulomb_friction"] > 0.95
-    first, second = (each.which.effects for each in found)
+        assert each.which.inclusion["coulomb_friction"] > 0.95
+    first, second = (each.which.inclusion for each in found)
     assert first == pytest.approx(second, abs=0.03)
     closed = [each.how_far.closed.median for each in found]
     assert closed[0] == pytest.approx(closed[1], abs=0.02)

@@ -83,7 +83,7 @@ def test_torques_over_angles_are_told_in_their_units():
     assert "force" not in " ".join(one.statement for one in found.seen)
     grams = {"angle_rad": table["angle_rad"], "torque_Nm": 1e3 * table["torque_Nm"]}
     scaled = diagnose(read_case(grams), quick=True)
-    assert scaled.which.effects == pytest.approx(found.which.effects, abs=0.05)
+    assert scaled.which.inclusion == pytest.approx(found.which.inclusion, abs=0.05)
 
 
 def test_a_spring_has_no_formula_to_compare_with():

@@ -107,5 +107,5 @@ def test_a_stretch_of_rows_that_is_off_is_no_wild_reading():
     force[100:130] += 5.0
     off = replace(case, records=replace(case.records, force=force))
     found = decide_searched(search(off, EFFECTS))
-    assert found.which.effects["outliers"] < 0.1
+    assert found.which.inclusion["outliers"] < 0.1
     assert found.which.outside.probability > 0.5

@@ -72,7 +72,7 @@ def test_the_library_can_do_without_an_effect(diagnose, cases, tmp_path: Path):
     assert diagnose(cases["one"], *given).returncode == 0
     found = json.loads((tmp_path / "one-diagnosis" / "verdict.json").read_text())
     assert not {"outliers", "hysteresis"} & {*found["library"]}
-    assert "hysteresis" not in found["which"]["effects"]
+    assert "hysteresis" not in found["which"]["inclusion"]
     assert "coulomb_friction" in found["library"]
 
 

@@ -105,9 +105,9 @@ def test_the_answer_stays(first: Diagnosis, case: Case, change: str, tmp_path: P
     second = diagnose(read, library=LIBRARY, quick=True)
     assert second.which.verdict == first.which.verdict
     assert {*second.which.causes[0].members} == {*first.which.causes[0].members}
-    for name, chance in first.which.effects.items():
+    for name, chance in first.which.inclusion.items():
         # The zero of the deformation has the same prior whatever the stroke.
-        assert second.which.effects[name] == pytest.approx(chance, abs=0.05)
+        assert second.which.inclusion[name] == pytest.approx(chance, abs=0.05)
     scale = abs(settings.get("force", 1.0))
     sd = second.gap.noise_sd_N
     assert sd == pytest.approx(scale * first.gap.noise_sd_N, rel=0.02)
@@ -123,7 +123,7 @@ def test_pulled_readings_have_the_same_answer():
         for each in (records, replace(records, **turned))
     )
     # A draw or two of two hundred may change sides of a threshold.
-    assert pulled.which.effects == pytest.approx(pressed.which.effects, abs=0.01)
+    assert pulled.which.inclusion == pytest.approx(pressed.which.inclusion, abs=0.01)
     assert pressed.how_far.closed is not None and pulled.how_far.closed is not None
     median = pressed.how_far.closed.median
     assert pulled.how_far.closed.median == pytest.approx(median, abs=1e-6)

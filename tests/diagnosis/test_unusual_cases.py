@@ -76,7 +76,7 @@ def test_wild_readings_and_a_loop_are_both_found():
     records = simulated(rich(), HYSTERESIS, seed=1).records
     force = np.array(records.force)
     force[[50, 131]] += 40.0 * NOISE
-    effects = quick(with_force(records, force)).which.effects
+    effects = quick(with_force(records, force)).which.inclusion
     assert effects["outliers"] > 0.9 and effects["hysteresis"] > 0.5
 
 
@@ -107,7 +107,7 @@ def test_zeros_of_many_short_runs(sd: float):
     if not sd:
         assert found.which.verdict == "none"
         return
-    assert found.which.effects["run_offset"] > 0.9
+    assert found.which.inclusion["run_offset"] > 0.9
     assert found.how_far.closed is not None and found.how_far.closed.median > 0.5
     assert found.how_far.left_out == "a quarter of each run"
 
@@ -160,7 +160,7 @@ def test_an_effect_that_is_left_out_is_not_named_and_one_of_a_user_is():
     case = simulated(rich(), HYSTERESIS, seed=1)
     library = {n: e for n, e in EFFECTS.items() if n != "hysteresis"}
     found = quick(case, library=library)
-    assert "hysteresis" not in found.which.effects
+    assert "hysteresis" not in found.which.inclusion
     assert found.library == tuple(library)
     library |= {"step": Step}
     with pytest.raises(InputError, match=r"step\.force"):
@@ -169,7 +169,7 @@ def test_an_effect_that_is_left_out_is_not_named_and_one_of_a_user_is():
     gear = replace(make_gear(), effect_priors=prior)
     case = simulated(rich(), {"step": {"force": 2.0}}, library=library)
     found = quick(replace(case, gear=gear), library=library)
-    assert found.which.effects["step"] > 0.9
+    assert found.which.inclusion["step"] > 0.9
 
 
 @pytest.mark.parametrize("names", [[], ["outliers"]])
@@ -209,4 +209,4 @@ def test_what_is_no_case_no_library_and_no_seed_is_refused():
 def test_what_was_not_measured_is_not_tested():
     which = quick(simulated(ramp(14), seed=2)).which
     assert which.not_testable["thermal_zero_drift"] == ("temperature",)
-    assert not {*which.not_testable} & {*which.effects}
+    assert not {*which.not_testable} & {*which.inclusion}

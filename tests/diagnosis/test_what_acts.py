@@ -42,13 +42,11 @@ def planted(request) -> tuple[str, Decision]:
 
 def test_planted_effect_acts(planted):
     name, found = planted
-    assert (
-        max(found.which.effects, key=lambda effect: found.which.effects[effect]) == name
-    )
+    assert found.which.effect == name
     cause = class_of(found, name)
     assert cause.probability >= 0.9 and cause in found.which.acting and found.which.fits
     assert cause.explains is not None and cause.explains.median > 0.9
-    assert found.which.set[0].effects == (name,)
+    assert found.which.explanations[0].effects == (name,)
 
 
 def test_probabilities_add_up(planted):
@@ -56,7 +54,7 @@ def test_probabilities_add_up(planted):
     whole = sum(each.probability for each in found.explanations)
     assert whole == pytest.approx(1.0, abs=1e-9)
     assert sum(found.hypotheses.values()) == pytest.approx(1.0, abs=1e-9)
-    held = [each.probability for each in found.which.set]
+    held = [each.probability for each in found.which.explanations]
     assert sum(held) >= 0.9 > sum(held[:-1])
     members = [name for each in found.which.causes for name in each.members]
     assert len(members) == len({*members})
@@ -69,17 +67,17 @@ def test_plain_case_has_no_gap():
 
 def test_wild_readings_are_outliers():
     found = decide(with_wild_readings(simulated(rich(), seed=2)), EFFECTS)
-    assert found.which.effects["outliers"] > 0.9
+    assert found.which.inclusion["outliers"] > 0.9
     assert found.which.outside.probability < 0.1
-    assert found.which.set[0].effects == ("outliers",)
+    assert found.which.explanations[0].effects == ("outliers",)
 
 
 def test_wild_readings_stand_beside_structure():
     case = simulated(rich(), {"hysteresis": PLANTED["hysteresis"]}, seed=2)
     found = decide(with_wild_readings(case), EFFECTS)
-    assert found.which.effects["hysteresis"] > 0.9
-    assert found.which.effects["outliers"] > 0.9
-    assert found.which.set[0].effects == ("hysteresis", "outliers")
+    assert found.which.inclusion["hysteresis"] > 0.9
+    assert found.which.inclusion["outliers"] > 0.9
+    assert found.which.explanations[0].effects == ("hysteresis", "outliers")
 
 
 def test_readings_that_agree_with_their_neighbours_are_no_outliers():
@@ -88,7 +86,7 @@ def test_readings_that_agree_with_their_neighbours_are_no_outliers():
     force[70:100] += 3.0
     case = replace(case, records=replace(case.records, force=force))
     found = decide(case, EFFECTS)
-    assert found.which.effects["outliers"] < 0.1 and found.gap > 0.99
+    assert found.which.inclusion["outliers"] < 0.1 and found.gap > 0.99
     assert found.which.outside.probability > 0.9
 
 
@@ -126,7 +124,7 @@ def test_effects_without_their_column_predict_nothing():
     found = decide(simulated(make_records(np.linspace(0.02, 0.54, 60))), EFFECTS)
     assert found.which.not_testable["thermal_stiffness"] == ("temperature",)
     assert found.which.not_testable["ovality"] == ("angle",)
-    assert not found.which.not_testable.keys() & found.which.effects.keys()
+    assert not found.which.not_testable.keys() & found.which.inclusion.keys()
 
 
 def read(scale: float = 1.0, origin: float = 0.0) -> Decision:
@@ -140,9 +138,9 @@ def read(scale: float = 1.0, origin: float = 0.0) -> Decision:
 @pytest.mark.parametrize(("scale", "origin"), [(1000.0, 0.0), (1.0, 40.0)])
 def test_scale_and_origin_of_the_force_change_little(scale, origin):
     plain, other = read(), read(scale, origin)
-    assert other.which.effects["hysteresis"] > 0.9
-    for name, chance in plain.which.effects.items():
-        assert other.which.effects[name] == pytest.approx(chance, abs=0.05)
+    assert other.which.inclusion["hysteresis"] > 0.9
+    for name, chance in plain.which.inclusion.items():
+        assert other.which.inclusion[name] == pytest.approx(chance, abs=0.05)
     ends = [each.gap_N for each in (plain, other)]
     assert ends[0] is not None and ends[1] is not None
     assert ends[1].median / scale == pytest.approx(ends[0].median, rel=0.02)
@@ -153,4 +151,4 @@ def test_coarse_reading_is_a_fact_and_no_gap():
     force = 1.5 * np.round(np.asarray(case.records.force) / 1.5)
     found = decide(replace(case, records=replace(case.records, force=force)), EFFECTS)
     assert found.coarse_step == pytest.approx(1.5)
-    assert found.gap < 0.5 and "quantisation" not in found.which.effects
+    assert found.gap < 0.5 and "quantisation" not in found.which.inclusion

@@ -2,6 +2,8 @@
 
 from typing import Any, Literal
 
+from pydantic import computed_field
+
 from hdcal.diagnosis.wording import either, on_noise, share_words, together
 from hdcal.report.item import EffectName, Interval, Item, Probability, Words
 
@@ -88,8 +90,8 @@ class Which(Item):
         verdict: in a word.
         causes: classes of effects, the most probable first.
         outside: something outside the library.
-        set: the smallest set of explanations with 90 %.
-        effects: probability that each effect acts.
+        explanations: the smallest set of them with 90 %.
+        inclusion: probability that each effect acts.
         fits: whether the likeliest explanation fits.
         p_value: of the check of its residuals.
         not_testable: effects that predict nothing here, with what was not measured.
@@ -98,11 +100,37 @@ class Which(Item):
     verdict: VerdictWord
     causes: tuple[Cause, ...]
     outside: Cause
-    set: tuple[Explanation, ...]
-    effects: dict[EffectName, Probability]
+    explanations: tuple[Explanation, ...]
+    inclusion: dict[EffectName, Probability]
     fits: bool
     p_value: Probability
     not_testable: dict[EffectName, tuple[Words, ...]]
+
+    @computed_field
+    @property
+    def effect(self) -> EffectName | None:
+        """The effect that acts most probably; None where none acts."""
+        if self.verdict in ("none", "unknown"):
+            return None
+        return max(self.inclusion, key=lambda name: self.inclusion[name])
+
+    @computed_field
+    @property
+    def group_members(self) -> tuple[EffectName, ...]:
+        """Effects of the class that holds `effect`."""
+        members = (each.members for each in self.causes if self.effect in each.members)
+        return next(members, ())
+
+    @computed_field
+    @property
+    def set(self) -> tuple[Words, ...]:
+        """Effects of the explanations, or `none` and `unknown`, likeliest first."""
+        names = [
+            name
+            for each in self.explanations
+            for name in (("unknown",) if each.outside else each.effects or ("none",))
+        ]
+        return tuple(dict.fromkeys(names))
 
     @property
     def acting(self) -> tuple[Cause, ...]:
