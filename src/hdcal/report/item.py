@@ -12,7 +12,7 @@ INTERVAL = 0.95
 
 Words = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=0)]
-EffectName = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
+EffectName = Annotated[str, Field(pattern="^[_A-Za-z][_A-Za-z0-9]*$")]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 # Sums of probabilities may exceed one by a rounding error.
 Probability = Annotated[float, Field(ge=0.0, le=1.000001)]
