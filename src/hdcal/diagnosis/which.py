@@ -109,10 +109,11 @@ class Which(Item):
     @computed_field
     @property
     def effect(self) -> EffectName | None:
-        """The effect that acts most probably; None where none acts."""
+        """The effect that acts most probably, on the mean reading where one does."""
         if self.verdict in ("none", "unknown"):
             return None
-        return max(self.inclusion, key=lambda name: self.inclusion[name])
+        on_mean = [name for each in self.on_mean for name in each.members]
+        return max(on_mean or self.inclusion, key=lambda name: self.inclusion[name])
 
     @computed_field
     @property
