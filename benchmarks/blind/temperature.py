@@ -1,6 +1,6 @@
-"""The temperature of the decision, fitted on an opened learning round.
+"""The temperature of the decision, compared on an opened learning round.
 
-Log posterior odds of hypotheses are divided by it. All hypotheses of each case are
+Log evidences of hypotheses are divided by it. All hypotheses of each case are
 evaluated once, and decided at each temperature: answers at one do not tell those at
 another, since several hypotheses may be one explanation.
 """

@@ -19,9 +19,9 @@ from hdcal.evidence.table import OUTSIDE, Names
 # A component acts from this squared visible length on, in noise variances.
 _SHOWN = 6.0
 # Hypotheses of less probability are not drawn from: all that they contain acts.
-_NEGLIGIBLE, _DRAWS = 3e-3, 200
+NEGLIGIBLE, DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
-_CARRIED = 0.5
+CARRIED = 0.5
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Acting:
         names = tuple(sorted([*effects, *noise]))
         if OUTSIDE not in self.components:
             return {names: 1.0}
-        outside = float(np.mean(self.carried < _CARRIED)) if effects else 1.0
+        outside = float(np.mean(self.carried < CARRIED)) if effects else 1.0
         return {(OUTSIDE,): outside, names: 1.0 - outside}
 
 
@@ -80,11 +80,11 @@ def acting(
         for noise, each in zip(table.noises, chance, strict=True):
             by_noise[noise.name] += float(each)
         drawn: list[Acting] = []
-        if key and max(by_noise.values()) >= _NEGLIGIBLE:
+        if key and max(by_noise.values()) >= NEGLIGIBLE:
             drawn = [*_drawn(searched, key, class_of, rng)]
         whole = [Acting(1.0, key, "", {}, np.ones(1), np.zeros(0))]
         for name, weight in by_noise.items():
-            for each in drawn if weight >= _NEGLIGIBLE and drawn else whole:
+            for each in drawn if weight >= NEGLIGIBLE and drawn else whole:
                 found.append(_weighted(each, weight, name))
     return found
 
@@ -103,7 +103,7 @@ def _drawn(
     problem, table = searched.problem, searched.table
     parts, noise = table.parts[key], table.likeliest_noise(key)
     names = [table.names[part.component] for part in parts]
-    curves, own = sampled_curves(problem, noise, parts, _DRAWS, rng)
+    curves, own = sampled_curves(problem, noise, parts, DRAWS, rng)
     # Structure within the rounding of a coarse reading shows nothing.
     largest = float(np.max(np.abs(problem.records.force)))
     least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))

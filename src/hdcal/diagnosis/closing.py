@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from hdcal.evidence.components import Components, components
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Part, Posterior, join, posterior
+from hdcal.evidence.parts import LinearPosterior, Part, join, posterior
 from hdcal.evidence.row_features import half_cycle_blocks, place_in_run
 from hdcal.evidence.search import Searched
 from hdcal.evidence.selection import select
@@ -140,7 +140,7 @@ def _without(
 
 
 def _variance(
-    found: Posterior, rows: Bool[np.ndarray, " n"]
+    found: LinearPosterior, rows: Bool[np.ndarray, " n"]
 ) -> Float[np.ndarray, " m"]:
     return np.sum((found.columns[rows] @ found.factor.T) ** 2, axis=1)
 

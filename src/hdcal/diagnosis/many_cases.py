@@ -139,7 +139,7 @@ class Diagnoses(Result):
         return Counter(row.verdict for row in self.rows)
 
 
-def overview(found: Mapping[str, "Answer"], refused: Refused) -> Diagnoses:
+def overview(found: Mapping[str, "CaseAnswer"], refused: Refused) -> Diagnoses:
     """Return the answers about many cases as one."""
     failed = tuple(
         f"{n}: failed" for n, a in found.items() if a.row.verdict == "FAILED"
@@ -153,7 +153,7 @@ def overview(found: Mapping[str, "Answer"], refused: Refused) -> Diagnoses:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CaseAnswer:
     """What is left of a diagnosis once its files are written.
 
     Attributes:
@@ -169,7 +169,7 @@ class Answer:
 
 def diagnose_all(
     asked: AskedCases, folder: Path, *, jobs: int, command: str, **settings
-) -> tuple[dict[str, Answer], AskedCases]:
+) -> tuple[dict[str, CaseAnswer], AskedCases]:
     """Diagnose every case and write its result.
 
     Args:
@@ -197,10 +197,10 @@ def diagnose_all(
                 place.mkdir()
             tasks = list(zip(cases, places, strict=True))
             outcomes = run_all(work, tasks, jobs, progress)
-    found: dict[str, Answer] = {}
+    found: dict[str, CaseAnswer] = {}
     refused = dict(asked.refused)
     for case, outcome in zip(cases, outcomes, strict=True):
-        if isinstance(outcome, Answer):
+        if isinstance(outcome, CaseAnswer):
             found[case.name] = outcome
         else:
             refused[case.name] = outcome
@@ -224,7 +224,7 @@ def _diagnose_one(
     report: bool,
     seed: int,
     progress=None,
-) -> Answer | tuple[Finding, ...]:
+) -> CaseAnswer | tuple[Finding, ...]:
     """Return the answer, or what is wrong with the case."""
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library
@@ -251,7 +251,7 @@ def _diagnose_one(
         probability=leading.probability,
         closed=closed and closed.median,
     )
-    return Answer(row, found.to_dict(), found if alone else None)
+    return CaseAnswer(row, found.to_dict(), found if alone else None)
 
 
 def _write(found: "Diagnosis", folder: Path, command: str, *, report: bool) -> None:

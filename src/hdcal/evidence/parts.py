@@ -83,7 +83,7 @@ def merged(parts: Sequence[Part]) -> Part:
     return parts[0]._replace(columns=columns, mean=mean, sd=sd, place=None)
 
 
-class Curves(NamedTuple):
+class DrawnCurves(NamedTuple):
     """Draws of what the base model leaves of each part [N].
 
     Attributes:
@@ -105,7 +105,7 @@ def join(problem: LinearProblem, parts: Sequence[Part]) -> Context:
     )
 
 
-class Posterior(NamedTuple):
+class LinearPosterior(NamedTuple):
     """Gaussian posterior of the coefficients of base and parts, in prior sds.
 
     Attributes:
@@ -128,7 +128,7 @@ class Posterior(NamedTuple):
 
 def posterior(
     problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
-) -> Posterior:
+) -> LinearPosterior:
     """Return the posterior of base and parts at the reference noise sd."""
     offset, columns = join(problem, parts)
     columns = np.concatenate([problem.X.T, columns])
@@ -137,7 +137,7 @@ def posterior(
     precision = white[:-1] @ white[:-1].T + np.eye(len(columns))
     factor = np.linalg.inv(np.linalg.cholesky(precision))
     mean = factor.T @ (factor @ (white[:-1] @ white[-1]))
-    return Posterior(mean, factor, columns.T, offset)
+    return LinearPosterior(mean, factor, columns.T, offset)
 
 
 def coefficients(problem: LinearProblem, parts: Sequence[Part]) -> list[slice]:
@@ -170,7 +170,7 @@ def sampled_curves(
     parts: Sequence[Part],
     count: int,
     rng: np.random.Generator,
-) -> Curves:
+) -> DrawnCurves:
     """Return posterior draws of the parts of a hypothesis.
 
     Args:
@@ -191,7 +191,9 @@ def sampled_curves(
                 for part, (_, columns) in zip(parts, each, strict=True)
             ]
             drawn.append(_drawn(problem, noise, loose, size, rng))
-    return Curves(*(np.concatenate(some, axis=1) for some in zip(*drawn, strict=True)))
+    return DrawnCurves(
+        *(np.concatenate(some, axis=1) for some in zip(*drawn, strict=True))
+    )
 
 
 def _drawn(
@@ -200,7 +202,7 @@ def _drawn(
     parts: Sequence[Part],
     count: int,
     rng: np.random.Generator,
-) -> Curves:
+) -> DrawnCurves:
     found, whole, own = posterior(problem, noise, parts), [], []
     normal = rng.standard_normal((count, len(found.mean)))
     draws = found.mean + normal @ found.factor
@@ -212,7 +214,7 @@ def _drawn(
         size = len(part.columns)
         own.append(offset + values[:, :size] @ columns[:size])
         whole.append(own[-1] + values[:, size:] @ columns[size:])
-    return Curves(np.stack(whole), np.stack(own))
+    return DrawnCurves(np.stack(whole), np.stack(own))
 
 
 def mean_curves(

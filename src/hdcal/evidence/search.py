@@ -36,7 +36,7 @@ from hdcal.evidence.parts import (
 )
 from hdcal.evidence.remainder import kernels
 from hdcal.evidence.selection import select
-from hdcal.evidence.table import OUTSIDE, Names, Table
+from hdcal.evidence.table import OUTSIDE, EvidenceTable, Names
 from hdcal.physics.effect import Effect
 
 # Components beside which others are looked for; models of the noise used there, and
@@ -73,7 +73,7 @@ class Searched:
     """
 
     problem: LinearProblem
-    table: Table
+    table: EvidenceTable
     predicting: Predicting
     selection: Selection
     kernels: list[np.ndarray]
@@ -120,7 +120,7 @@ def search(
     )
 
 
-def _oversampled(problem: LinearProblem, table: Table) -> bool:
+def _oversampled(problem: LinearProblem, table: EvidenceTable) -> bool:
     """Return whether noise is correlated as far as the grid reaches, in many rows."""
     if int(np.argmax(table.noise_probabilities())) < len(problem.correlations) - 1:
         return False
@@ -128,7 +128,7 @@ def _oversampled(problem: LinearProblem, table: Table) -> bool:
     return enough and half_cycle_rows(problem.records) >= _STEP * _FEWEST_OF_HALF
 
 
-def _expansion(problem: LinearProblem, table: Table) -> Expansion | None:
+def _expansion(problem: LinearProblem, table: EvidenceTable) -> Expansion | None:
     """Return the point of expansion beside the best hypothesis, where it differs."""
     parts = table.parts[table.ranked()[0]]
     found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
@@ -167,7 +167,7 @@ class _Search:
         )
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
-        self.table = Table((*effects.names, OUTSIDE), equal_noise(problem))
+        self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
         self.selection = select(
             problem,
             self.table.noises,

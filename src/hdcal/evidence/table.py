@@ -19,7 +19,7 @@ _SINGLE = 1.0 - (_NONE + _REMAINDER + _BESIDE + _PAIRS + _PAIRS_BESIDE)
 
 
 @dataclass
-class Table:
+class EvidenceTable:
     """Log evidence of hypotheses on the mean reading, by model of the noise.
 
     Attributes:

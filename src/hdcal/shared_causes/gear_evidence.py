@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from hdcal.data.case import Case
 from hdcal.data.scatter import require_scatter
-from hdcal.diagnosis.acting import share_closed
+from hdcal.diagnosis.acting import CARRIED, DRAWS, NEGLIGIBLE, share_closed
 from hdcal.errors import Finding, Findings, quoted
 from hdcal.evidence.noise_models import PRIOR_ODDS
 from hdcal.evidence.parts import sampled_curves
@@ -23,11 +23,8 @@ NONE = "none"
 # Fewer rows than these beside the parameters of a line with an offset for each run
 # cannot separate causes from noise.
 _FEWEST_LEFT = 8
-# Draws of the share of the gap that effects close beside something outside the
-# library, the share from which on they are the cause, and the range of its probability.
-_DRAWS, _CARRIED, _RANGE = 200, 0.5, (1e-3, 1.0 - 1e-3)
-# Hypotheses of less posterior probability are not drawn from.
-_NEGLIGIBLE = 3e-3
+# Range of the probability that effects close half of the gap.
+_RANGE = (1e-3, 1.0 - 1e-3)
 
 
 class Weight(NamedTuple):
@@ -112,7 +109,7 @@ def by_cause(searched: Searched, rng: np.random.Generator) -> dict[str, Weight]:
     table, parts = searched.table, defaultdict(list)
     posterior = table.posterior()
     for key, row in table.log_evidence.items():
-        drawn = posterior[key].sum() >= _NEGLIGIBLE
+        drawn = posterior[key].sum() >= NEGLIGIBLE
         shares = _shares(searched, key, rng if drawn else None)
         for noise in {model.name for model in table.noises}:
             same = [model.name == noise for model in table.noises]
@@ -158,11 +155,11 @@ def _carried(searched: Searched, key: Names, rng: np.random.Generator) -> float:
     """Return the probability that effects close half of the gap."""
     table = searched.table
     parts, noise = table.parts[key], table.likeliest_noise(key)
-    curves = sampled_curves(searched.problem, noise, parts, _DRAWS, rng)
+    curves = sampled_curves(searched.problem, noise, parts, DRAWS, rng)
     effects = [
         curve
         for part, curve in zip(parts, curves.own, strict=True)
         if table.names[part.component] != OUTSIDE
     ]
-    chance = np.mean(share_closed(curves.whole.sum(axis=0), effects) >= _CARRIED)
+    chance = np.mean(share_closed(curves.whole.sum(axis=0), effects) >= CARRIED)
     return float(np.clip(chance, *_RANGE))
