@@ -29,8 +29,10 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
 
     One for all tests: who kills a worker gets a new one by its nanny.
     """
-    import dask
-
+    dask = pytest.importorskip("dask")
+    # Before its settings are changed: where they are put back, those that it brought
+    # in meanwhile would go too, and another module's cluster would miss them.
+    pytest.importorskip("distributed")
     quiet = {"distributed.scheduler.allowed-failures": 1}
     with (
         dask.config.set(quiet),
