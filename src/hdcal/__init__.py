@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
     from hdcal.physics.registry import EFFECTS
-    from hdcal.prediction.bands.bands import predict
+    from hdcal.prediction.bands.predict import predict
     from hdcal.prediction.margin.margin import margin
     from hdcal.shared_causes.causes import causes
     from hdcal.tracking.tracker import Tracker
@@ -67,7 +67,7 @@ _HOMES = {
     "inverse_design": "design.inverse_design.inverse_design",
     "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
-    "predict": "prediction.bands.bands",
+    "predict": "prediction.bands.predict",
     "read_case": "data.reading",
     "residuals": "inference.residuals",
     "respond": "motion.respond.respond",

@@ -8,7 +8,7 @@ from hdcal.calibration.check.charts import left_out
 from hdcal.data.loading import movement_words
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
-from hdcal.prediction.bands.bands import Bands
+from hdcal.prediction.bands.predict import Bands
 from hdcal.prediction.bands.charts import (
     band_marks,
     branch_marks,
@@ -64,7 +64,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
             # leftover discrepancy differs between them.
             if branch.temperature == level
             and (branch.loading or (gap is not None and gap.looped))
-            for mark in branch_marks(bands, branch, around_median=True)
+            for mark in branch_marks(bands, branch, around_model=True)
         ]
         panels.append(
             Panel(

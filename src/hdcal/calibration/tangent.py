@@ -11,7 +11,7 @@ from hdcal.exported import jit
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
-from hdcal.prediction.engine.forces import force_of, grid_records
+from hdcal.prediction.forces import force_of, grid_records
 from hdcal.report.item import Interval
 
 # Length of the secant as a share of the largest deformation: short beside what an

@@ -261,7 +261,7 @@ def _write(found: "Diagnosis", folder: Path, command: str, *, report: bool) -> N
     files = {"verdict.json": found.to_json().encode()}
     if (average := found.average) is not None:
         from hdcal.inference.posterior_file import FILE_NAME
-        from hdcal.prediction.bands.bands import default_bands
+        from hdcal.prediction.bands.predict import default_bands
         from hdcal.report.table_files import columns_csv
 
         bands = default_bands([*found.posteriors.values()])

@@ -181,10 +181,9 @@ class FleetPosterior:
 
 def _share_findings(shares: Mapping[str, float], draws: int) -> Iterator[Finding]:
     # Late: it is not needed to fit a fleet.
-    from hdcal.prediction.shares import check_rarity, check_shares
+    from hdcal.prediction.shares import share_findings
 
-    yield from check_shares(**shares)
-    yield from check_rarity(shares, draws)
+    yield from share_findings(shares, draws)
     if 0.0 < shares.get("content", 1.0) <= 0.5:
         words = f"{shares['content']:g} is no more than half of the gears to come"
         yield Finding("content", words, "Ask for more than 0.5")

@@ -1,42 +1,36 @@
-"""Content and confidence of bounds: named pairs, and limits of what can be asked."""
+"""Content and confidence of bounds: what can be asked."""
 
 from collections.abc import Mapping
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding
 
-# Content and confidence of the bounds named in aviation (CMH-17, vol. 1, ch. 8).
-BASES = {"A-basis": (0.99, 0.95), "B-basis": (0.90, 0.95)}
-# Least number of draws beyond a bound that locate it.
+# Draws that must lie beyond a bound to locate it.
 _BEYOND = 10
-# A normal distribution does not describe tails rarer than this.
-_RAREST = 1e-9
+# A rarer case than one in a million rests on the normal law of the scatter alone:
+# no test of this size has readings so far out.
+RAREST = 1e-6
 
 
-def check_shares(**shares: float) -> list[Finding]:
-    """Return a finding for every share that does not lie between 0 and 1."""
-    return [f for name, value in shares.items() for f in implausible(name, value)]
-
-
-def check_rarity(
+def share_findings(
     shares: Mapping[str, float], draws: int, more: str = ""
 ) -> list[Finding]:
-    """Return findings for what so many draws, or any normal law, cannot tell.
+    """Return findings for shares that are none, and for those that cannot be resolved.
 
     Args:
-        shares: by name; the confidence is one of draws.
+        shares: by name; `confidence` is a share of the draws.
         draws: of what is not known.
         more: how there would be more of them, after what can be asked.
     """
-    findings = []
-    sure, most = shares["confidence"], 1.0 - _BEYOND / draws
-    if most < sure < 1.0:
-        words = f"{draws} draws cannot tell a confidence of {sure:g}"
-        remedy = f"Ask for {most:.4g} or less{more}"
-        findings.append(Finding("confidence", words, remedy))
-    for name in shares.keys() - {"confidence"}:
-        if 1.0 - _RAREST < shares[name] < 1.0:
-            words = f"{shares[name]:.12g} is beyond what any model of noise can promise"
-            remedy = "Ask for 0.999999999 or less"
-            findings.append(Finding(name, words, remedy))
+    findings = [f for name, value in shares.items() for f in implausible(name, value)]
+    if findings:
+        return findings
+    most = 1.0 - _BEYOND / draws
+    for name, share in shares.items():
+        if name == "confidence" and share > most:
+            words = f"{draws} draws cannot resolve a confidence of {share:g}"
+            findings.append(Finding(name, words, f"Ask for {most:.4g} or less{more}"))
+        elif name != "confidence" and share > 1.0 - RAREST:
+            words = f"{share:.12g} is beyond what a model of the scatter can promise"
+            findings.append(Finding(name, words, f"Ask for {1.0 - RAREST:g} or less"))
     return findings

@@ -71,6 +71,25 @@ def html_page(
     )
 
 
+def sheet_page(result: "Result", block: str, signed: Mapping[str, str]) -> str:
+    """Return a block of a result as the text of an HTML page to print and sign.
+
+    Args:
+        result: of the template.
+        block: name of the block.
+        signed: what stands above the line of signature, by its name.
+    """
+    style = _part("style.css")
+    page = _environment().get_template("sheet.html.j2")
+    return page.render(
+        name=result.line("title"),
+        body=Markup(html(parsed(result.block(block)))),
+        signed={**signed, "signature": ""},
+        style=Markup(style),
+        policy=Markup(_policy(style, "")),
+    )
+
+
 def notebook_html(result: "Result") -> str:
     """Return what a notebook's cell shows of a result."""
     shown = _inline(result, "headline")

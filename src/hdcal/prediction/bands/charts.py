@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hdcal.data.loading import loading_side, movement_words
-from hdcal.prediction.bands.bands import Bands
 from hdcal.report.axes import load_axis
 from hdcal.report.chart_spec import (
     Band,
@@ -18,6 +18,9 @@ from hdcal.report.chart_spec import (
     ascending_colours,
     beyond,
 )
+
+if TYPE_CHECKING:
+    from hdcal.prediction.bands.predict import Bands
 
 # Kind of a band, its label and its opacity; each lies on those before it.
 _BANDS = (
@@ -51,20 +54,20 @@ class Branch:
     opacity: float
 
 
-def bands_chart(bands: Bands) -> Chart:
+def bands_chart(bands: "Bands") -> Chart:
     """Return force over deformation."""
     units = bands.units
     axis = f"{units.displacement} as read [{units.displacement_unit}]"
     return Chart(panels=[Panel(x=axis, y=load_axis(units), marks=band_marks(bands))])
 
 
-def band_marks(bands: Bands) -> list[Mark]:
+def band_marks(bands: "Bands") -> list[Mark]:
     """Return the bands of the force, and upon them the medians."""
     marks = [mark for b in branches(bands) for mark in branch_marks(bands, b)]
     return sorted(marks, key=lambda mark: isinstance(mark, Line))
 
 
-def branches(bands: Bands) -> list[Branch]:
+def branches(bands: "Bands") -> list[Branch]:
     """Return temperatures in ascending order, each with its directions."""
     levels = np.unique(bands.temperature_C)
     colours = ascending_colours(len(levels))
@@ -100,27 +103,27 @@ def branches(bands: Bands) -> list[Branch]:
 
 
 def branch_marks(
-    bands: Bands, branch: Branch, *, around_median: bool = False
+    bands: "Bands", branch: Branch, *, around_model: bool = False
 ) -> Iterator[Mark]:
     """Yield bands and medians of one temperature and direction.
 
     Args:
         bands: of any number of branches.
         branch: which one.
-        around_median: as distances from the median, without labels.
+        around_model: as distances from the model without the bend, without labels.
     """
     rows, colour = branch.rows, branch.colour
     x, tested = bands.deformation_mm[rows], np.asarray(bands.tested[rows], bool)
     untested = beyond(tested)
     middle = bands.physics_median_N[rows]
-    zero = middle if around_median else np.zeros(len(x))
+    zero = bands.straight_N[rows] if around_model else np.zeros(len(x))
 
     def part(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
         return np.where(shown, values - zero, np.nan)
 
     def label(text: str) -> str:
         text = text.format(load=bands.units.load)
-        return text if branch.first and not around_median else ""
+        return text if branch.first and not around_model else ""
 
     for kind, words, full in _BANDS:
         low, high = (getattr(bands, f"{kind}_{end}_N")[rows] for end in ("lo", "hi"))
@@ -140,7 +143,7 @@ def branch_marks(
                     hatched=lined,
                 )
     dash: Dash = "solid" if branch.loading else "dashed"
-    name = "" if around_median else branch.label
+    name = "" if around_model else branch.label
     curves: list[tuple[np.ndarray, np.ndarray, str, Dash, float]] = [
         (middle, tested, name, dash, 1.6),
         (middle, untested, label(_UNTESTED), "dotted", 1.6),

@@ -10,7 +10,7 @@ from hdcal.cli.option_types import DEFORMATIONS, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
 from hdcal.quantities import FORCE
 
-# By these columns --force knows an older table.
+# By these columns --force recognises an older table.
 _COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
 
 
@@ -42,31 +42,26 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     """Predict the force with its bands from RUN.
 
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
-    could not tell apart are averaged over by their probability.
+    could not separate are averaged over by their probability.
     """
     from hdcal.inference.model_average import load_models
-    from hdcal.prediction.engine.causes import averaging_words, causes_of
+    from hdcal.prediction.models import models_of
+    from hdcal.prediction.bands.predict import predict as bands_of
     from hdcal.report.saving import Target
+    from hdcal.report.table_files import columns_csv
 
     file = None
     with console.wrong as wrong:
         models = wrong.attempt(load_models, run)
-        units = FORCE if models is None else causes_of(models)[0].posterior.case.units
+        units = FORCE if models is None else models_of(models)[0].posterior.case.units
         if out is not None:
             beginning = ",".join(map(units.key, _COLUMNS)).encode()
             file = console.hold(partial(Target, out, force, beginning=beginning))
     assert models is not None
-    causes = causes_of(models)
-    from hdcal.prediction.bands.bands import predict as bands_of
-    from hdcal.prediction.bands.document import untested_rows
-    from hdcal.prediction.bands.summary import prediction_answer
-    from hdcal.report.table_files import columns_csv
-
     bands = bands_of(models, deformation, temperature, direction)
-    untested = untested_rows(bands, causes[0].posterior.case.records)
-    for words in (*averaging_words(causes), *filter(None, [untested])):
+    for words in bands.lines("notes"):
         console.words(words)
-    table = columns_csv(bands.columns())
+    table = columns_csv(dict(bands.to_frame()))
     if file is not None:
         with file.filled() as path:
             path.write_text(table, "utf-8")
@@ -74,5 +69,5 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     elif not console.json:
         console.result(table.rstrip("\n"))
     if console.json:
-        console.data(prediction_answer(bands, causes=causes))
+        console.data(bands.to_dict())
     return 0

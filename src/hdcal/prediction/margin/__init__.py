@@ -1,1 +1,1 @@
-"""What force does a deformation need, for how many of whom, how surely?"""
+"""Which force does a deformation need, and does it keep a limit?"""

@@ -60,26 +60,30 @@ def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force needed at a deformation, from RUN.
 
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
-    could not tell apart are averaged over by their probability. Of a folder of `hdcal
-    fleet` it tells what gears to come need.
+    could not separate are averaged over by their probability. From a folder of `hdcal
+    fleet` it bounds what the next gears need.
     """
     from hdcal.inference.model_average import load_models
-    from hdcal.prediction.engine.models import model_pairs
     from hdcal.prediction.margin.margin import margin as bounds_of
-    from hdcal.prediction.margin.summary import margin_report
+    from hdcal.prediction.models import model_pairs
 
     with console.wrong as wrong:
         models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
         wrong += options.needs_folder("certificate", certificate, out)
-        posterior = None
         if models is not None:
-            posterior = max(model_pairs(models), key=lambda model: model[0])[1]
+            units = model_pairs(models)[0][1].case.units
             names = "deformation", "limit_force", "given_force"
-            given = {name: asked[name] for name in names if name in asked}
-            wrong += unit_findings(posterior.case.units, **given)
-    assert models is not None and posterior is not None
+            wrong += unit_findings(units, **{name: asked[name] for name in names})
+    assert models is not None
     found = bounds_of(models, **asked)
-    signed = date.today() if certificate else None
-    how = {"seed": asked["seed"], "certificate": signed}
-    return console.report(margin_report(found, posterior, console.command, **how))
+    others = {}
+    if certificate:
+        page = found.certificate(date.today())
+        others["certificate.html"] = lambda: page.encode()
+    return console.show(
+        found,
+        answer="margin.json",
+        tables={"budget.csv": found.budget_frame()},
+        others=others,
+    )

@@ -1,68 +1,63 @@
-"""Margins: the force that a deformation needs, for how many of whom, how surely."""
+"""Margin: the force that a deformation needs, and whether it keeps a limit.
+
+A bound with content p and confidence γ: in each draw of the posterior the force that
+the share p of the members does not exceed; of these the quantile γ over the draws.
+With a normal population and the reference prior it is the classical tolerance limit.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
-from hdcal.errors import Finding, InputError
-from hdcal.prediction.engine.causes import (
-    Cause,
-    causes_of,
-    chances_of,
-    likeliest,
-    weight_left_out,
-)
-from hdcal.prediction.engine.conditions import (
+from hdcal.data.theory_names import SPRING
+from hdcal.inference.residuals import residuals
+from hdcal.inference.checks import correlation_check
+from hdcal.prediction.conditions import (
     SENSE,
+    Conditions,
     Direction,
     beyond_tested,
+    direction_of_loading,
     is_tested,
+    usual_temperature,
 )
-from hdcal.prediction.engine.forces import Quantity
-from hdcal.prediction.engine.loading_sense import (
-    LoadingSense,
-    loading_sense,
-    sense_of,
+from hdcal.prediction.forces import Quantity
+from hdcal.prediction.margin.budget import budget
+from hdcal.prediction.margin.decision import decide
+from hdcal.prediction.margin.request import (
+    Request,
+    Rule,
+    require_answerable,
+    require_numbers,
 )
-from hdcal.prediction.engine.models import Models
-from hdcal.prediction.engine.population import Population, widest
-from hdcal.prediction.engine.population_force import PopulationForce, population_force
-from hdcal.prediction.engine.reading_grid import ReadingGrid, reading_grid
-from hdcal.prediction.engine.sizes import SIZES
-from hdcal.prediction.margin.bounds import (
-    PopulationDraws,
-    level_of,
-    population_draws,
-    shown,
-    shown_bounds,
-    worst_level,
+from hdcal.prediction.margin.reached import deformation_reached
+from hdcal.prediction.margin.result import (
+    Calibrated,
+    Exceedance,
+    Level,
+    Margin,
+    ModelBound,
 )
-from hdcal.prediction.margin.checks import check_margin, check_sign
-from hdcal.prediction.margin.decision import decision
-from hdcal.prediction.margin.deformation_reached import (
-    DeformationReached,
-    deformation_reached,
+from hdcal.prediction.members import Members, joined, one_member, over_draws
+from hdcal.prediction.models import (
+    Model,
+    Models,
+    averaging_words,
+    left_out_of,
+    models_of,
+    probabilities,
 )
-from hdcal.prediction.margin.gradients import gradients
-from hdcal.prediction.margin.refined import (
-    refined,
-    refined_models,
-    with_likeliest,
-)
-from hdcal.prediction.margin.remarks import (
-    extrapolations,
-    population_words,
-    remarks,
-)
-from hdcal.prediction.margin.request import Criteria, MarginRequest
-from hdcal.prediction.margin.result import FAR, Level, Margin, ModelBound
-from hdcal.prediction.margin.stated import Rule
-from hdcal.prediction.margin.temperatures import levels_between, nodes_of
-from hdcal.prediction.margin.uncertainty import stated_uncertainty
-from hdcal.prediction.margin.variance_shares import variance_shares
-from hdcal.prediction.shares import BASES
-from hdcal.report.document import mapped
+from hdcal.prediction.shares import RAREST
+from hdcal.prediction.simulate import Population, simulate, widest
+from hdcal.prediction.sizes import SIZES
+from hdcal.report.item import INTERVAL, Interval
+from hdcal.versions import versions
+
+_TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
+# Largest relative Monte Carlo error of a probability that is a number. Of an event that
+# n independent draws do not show, the probability is below 3/n with 95 % confidence.
+_ROUGH, _UNSEEN = 0.3, 3.0
 
 
 def margin(
@@ -79,7 +74,6 @@ def margin(
     quantity: Quantity = "reading",
     direction: Direction = "up",
     tolerances: Mapping[str, float] | None = None,
-    sensitivities: bool = True,
     seed: int = 0,
     rule: Rule | None = None,
 ) -> Margin:
@@ -90,205 +84,252 @@ def margin(
         deformation: as read [mm].
         temperature: of the specimen [°C]; of several the worst counts. By default
             the tested one nearest to the reference.
-        limit_force: capacity [N], a size along the sense of loading, or with its sign.
+        limit_force: capacity [N], a size along the direction of loading, or with its
+            sign.
         given_force: force [N] whose deformation is asked for, with its sign.
         content: share of the population within each one-sided bound.
         confidence: of each bound.
-        required_probability: that a capacity is to meet; the content by default.
+        required_probability: that a capacity is to hold; the content by default.
         population: whose force; by default the widest that the data support.
         quantity: `reading` of the rig's gauge, or `load` on the gear.
         direction: up to load, away from the unloaded gear; down to unload.
         tolerances: ± by wall_thickness_mm, radius_mm, length_mm, load_height_mm.
-        sensitivities: with gradients, the budget and shares of the variance.
-        seed: of what the data leave open about the population's centre.
+        seed: of what the draws leave open.
         rule: of the decision about the limit, guarded (by default) or simple.
-
-    Returns:
-        Bounds by temperature and over all of them; every interval says its kind.
 
     Raises:
         NotUsable: a calibration failed its checks.
         InputError: what is asked cannot be answered; holds every finding.
     """
-    asked = {"deformation": deformation, "limit_force": limit_force}
-    asked |= {"given_force": given_force, "content": content, "confidence": confidence}
-    asked |= {"required_probability": required_probability}
-    optional = {"limit_force", "given_force", "required_probability"}
-    wrong = [
-        Finding(name, "is not one number", "Ask for one at a time")
-        for name, given in asked.items()
-        if _axes(given) != 0 and not (given is None and name in optional)
-    ]
-    if temperature is not None and _axes(temperature) not in (0, 1):
-        wrong.append(Finding("temperature", "is no list of numbers", "Give degrees C"))
-    if wrong:
-        raise InputError(wrong)
-    sizes = {name: float(width) for name, width in (tolerances or {}).items()}
-    about = direction, sizes, population, quantity, given_force, seed
-    request = MarginRequest(deformation, temperature, *about)
-    criteria = Criteria(content, confidence, required_probability, limit_force, rule)
-    return _margin(causes_of(models), request, criteria, sensitivities)
-
-
-def _axes(given: object) -> int | None:
-    """Return the number of axes of numbers, None of what is none."""
-    try:
-        found = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        return None
-    return None if given is None or isinstance(given, str) else found.ndim
-
-
-def _margin(
-    causes: Sequence[Cause],
-    request: MarginRequest,
-    criteria: Criteria,
-    sensitivities: bool,
-) -> Margin:
-    main, sense = likeliest(causes), loading_sense(causes, request.deformation)
-    units = main.posterior.case.units
-    warm = request.temperatures(main.posterior.case)
-    check_margin(causes, request, warm, criteria, sense)
-    criteria = criteria.of_size()
-    whose = request.population or widest(main.problem)
-    forces = _forces(causes, request, whose, sense)
-    grid = _grid(forces, sense)
-    unrounded = criteria.before_rounding(grid)
-    answered = _answered(forces, request, unrounded, warm)
-    check_sign(answered.computed, request, criteria, sense, units)
-    worst = shown(answered.worst, grid, sense)
-    there = [force.at(worst.temperature_C) for force in forces]
-    stated = stated_uncertainty(there, worst, with_budget=sensitivities)
-    found = Margin(
-        **vars(stated),
-        deformation_mm=float(request.deformation),
-        direction=request.direction,
-        loading_sense=sense,
-        quantity=request.quantity,
-        population=whose,
-        population_words=population_words(whose, main.problem),
-        basis=_basis(whose, criteria, forces[0]),
-        content=criteria.content,
-        confidence=criteria.confidence,
-        required_probability=criteria.required,
-        limit_force_N=criteria.limit_force,
-        tolerances_mm=request.tolerances,
-        levels=tuple(shown(level, grid, sense) for level in answered.levels),
-        worst=worst,
-        reached=_reached(there, request, criteria),
-        decision=decision(stated, worst, criteria, unrounded, sense, there),
-        models=tuple(shown_bounds(model, grid, sense) for model in answered.models),
-        causes=chances_of(causes),
-        weight_left_out=weight_left_out(causes),
-        gradients=gradients(there, answered.upper, criteria) if sensitivities else (),
-        shares=variance_shares(there, request.seed) if sensitivities else (),
-        beyond_tested=beyond_tested(forces[0].conditions),
-        extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, answered.computed, worst, criteria, grid),
-        units=units,
+    require_numbers(
+        temperature,
+        deformation=deformation,
+        limit_force=limit_force,
+        given_force=given_force,
+        content=content,
+        confidence=confidence,
+        required_probability=required_probability,
     )
-    return mapped(found, units.say)
+    found = models_of(models)
+    case = found[0].posterior.case
+    warm = usual_temperature(case) if temperature is None else temperature
+    asked = Request(
+        deformation=deformation,
+        temperature=np.atleast_1d(np.asarray(warm, float)),
+        direction_of_loading=direction_of_loading(found, deformation),
+        limit_force=None if limit_force is None else abs(limit_force),
+        given_force=given_force,
+        content=content,
+        confidence=confidence,
+        required=content if required_probability is None else required_probability,
+        population=population or widest(found[0].problem),
+        quantity=quantity,
+        direction=direction,
+        tolerances={n: float(by) for n, by in (tolerances or {}).items()},
+        rule=rule or "guarded",
+        seed=seed,
+    )
+    require_answerable(found, asked, limit_force, rule)
+    return _answered(found, asked, models)
 
 
-class _Answered(NamedTuple):
-    """What holds at each temperature, of the force before it is rounded.
-
-    Attributes:
-        computed: at the computed temperatures.
-        levels: at all that were asked for.
-        worst: of all of them.
-        models: what each of several causes alone would say.
-        upper: of each draw the upper bound at the worst temperature [N].
-    """
-
-    computed: tuple[Level, ...]
-    levels: tuple[Level, ...]
-    worst: Level
-    models: tuple[ModelBound, ...]
-    upper: np.ndarray
-
-
-def _answered(
-    forces: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria, warm
-) -> _Answered:
-    main, sense = likeliest([force.cause for force in forces]), forces[0].sense
-    nodes = nodes_of(warm, main.posterior.case.records)
-    draws = population_draws(forces, nodes, criteria)
-    computed = _levels(draws, main, request, nodes, criteria)
-    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
-    levels = refined(levels, forces, criteria.limit_force, request.seed)
-    worst = with_likeliest(worst_level(draws, criteria, computed), levels)
-    models = refined_models(forces, draws, criteria, worst, request.seed)
-    upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
-    return _Answered(computed, levels, worst, models, upper)
-
-
-def _forces(
-    causes: Sequence[Cause],
-    request: MarginRequest,
-    whose: Population,
-    sense: LoadingSense,
-) -> list[PopulationForce]:
-    """Return the forces that each cause expects."""
-    about = {
-        "quantity": request.quantity,
-        "direction": request.direction,
-        "sense": sense,
-        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
-        "seed": request.seed,
-    }
-    return [population_force(c, request.deformation, whose, **about) for c in causes]
+def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margin:
+    at = Conditions.of(
+        asked.deformation,
+        asked.temperature,
+        asked.direction_of_loading,
+        asked.direction == "down",
+        quantity=asked.quantity,
+        tolerances={SIZES[n]: by for n, by in asked.tolerances.items() if by > 0.0},
+    )
+    parts = [simulate(m, at, asked.population, seed=asked.seed) for m in found]
+    step = float(found[0].problem.step) if asked.quantity == "reading" else 0.0
+    levels = _levels(found, asked, joined(parts), step)
+    sign, posterior = asked.direction_of_loading, found[0].posterior
+    row = int(np.argmax([_outer(level, sign) for level in levels]))
+    worst, here = levels[row], [part.row(row) for part in parts]
+    rows, estimate, sd = budget(found, here, step / 12.0**0.5, sign, posterior.case.units)
+    expanded = 0.5 * (worst.member_N.hi - worst.member_N.lo)
+    bend = np.concatenate([sign * part.common["leftover"][:, 0] for part in here])
+    weight = np.concatenate([part.weight for part in here])
+    mean = float(weight @ bend)
+    return Margin(
+        deformation_mm=float(asked.deformation),
+        direction=asked.direction,
+        loading_sense=1 if sign > 0 else -1,
+        quantity=asked.quantity,
+        population=asked.population,
+        content=asked.content,
+        confidence=asked.confidence,
+        required_probability=asked.required,
+        limit_force_N=asked.limit_force,
+        tolerances_mm=dict(asked.tolerances),
+        levels=levels,
+        worst=worst,
+        estimate_N=estimate,
+        combined_standard_uncertainty_N=sd,
+        coverage_factor=expanded / sd,
+        expanded_uncertainty_N=expanded,
+        budget=rows,
+        decision=_decision(asked, worst, estimate, step),
+        reached=deformation_reached(found, asked, at, worst.temperature_C),
+        models=_each_model(found, here, asked, step) if len(found) > 1 else (),
+        causes=probabilities(found),
+        weight_left_out=left_out_of(models),
+        beyond_tested=beyond_tested(asked.deformation, posterior.case.records),
+        interval=INTERVAL,
+        seed=asked.seed,
+        versions=versions(),
+        data=_data(found[0]),
+        posterior=posterior,
+        bend_N=(mean, float(weight @ (bend - mean) ** 2) ** 0.5),
+        averaging=tuple(averaging_words(models)),
+        warnings=_warnings(found),
+        turn_mm=float(at.turn(posterior.case.records)[0]),
+        part="part" if posterior.theory == SPRING else "gear",
+        units=posterior.case.units,
+    )
 
 
 def _levels(
-    draws: PopulationDraws, main: Cause, request: MarginRequest, warm, criteria
+    found: Sequence[Model], asked: Request, members: Members, step: float
 ) -> tuple[Level, ...]:
-    """Return what holds at each temperature [°C]."""
-    tested = _tested(main, request, draws.sense, warm)
-    tables = [{n: t[i] for n, t in draws.table.items()} for i in range(len(warm))]
-    places = zip(tables, draws.predicted, warm, tested, strict=True)
-    return tuple(
-        level_of(draws, table, ahead, criteria, float(at), bool(inside))
-        for table, ahead, at, inside in places
-    )
+    """Return the force at each temperature.
 
-
-def _reached(
-    there: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
-) -> DeformationReached | None:
-    given = request.given_force
-    if given is None:
-        return None
-    grid = _grid(there, sense_of(given))
-    return deformation_reached(there, given, criteria, grid)
-
-
-def _grid(forces: Sequence[PopulationForce], sense: LoadingSense) -> ReadingGrid:
-    """Return what readings are rounded to along a sense."""
-    first = forces[0]
-    case = first.cause.posterior.case
-    return reading_grid(case, sense, rounded=first.whose.rounded)
-
-
-def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
-    """Tell at which temperatures [°C] the data hold what is asked for."""
-    return is_tested(
-        main.posterior.case.records,
-        deformation=request.deformation,
-        temperature=warm,
-        sense=sense * SENSE[request.direction],
-    )
-
-
-def _basis(population: Population, criteria: Criteria, force: PopulationForce) -> str:
-    """Return the name of such a bound, of gears whose deformation was tested.
-
-    It has none where the prior tells how much gears differ.
+    A reading lies within half a step of the force: bounds, capacities and the limit are
+    for the worst place of the force in a step. The interval of one member has the
+    rounding as a component.
     """
-    beyond = beyond_tested(force.conditions)
-    scatter = force.cause.posterior.diagnoses.get("specimen_sd")
-    by_prior = scatter is not None and scatter.driven_by == "prior"
-    if population != "specimens" or beyond > FAR or by_prior:
-        return ""
-    pair = (criteria.content, criteria.confidence)
-    return next((name for name, shares in BASES.items() if shares == pair), "")
+    sign, half, weight = asked.direction_of_loading, 0.5 * step, members.weight
+    lower, upper, needed = (
+        members.quantile(share)
+        for share in (1.0 - asked.content, asked.content, asked.required)
+    )
+    low = over_draws(lower, weight, [1.0 - asked.confidence])[0] - half
+    high = over_draws(upper, weight, [asked.confidence])[0] + half
+    least, capacity = over_draws(needed, weight, [0.5, asked.confidence]) + half
+    mean = over_draws(members.centre, weight, _TAILS)
+    one = one_member(members, step / 12.0**0.5)
+    member = [one.quantile(tail)[0] for tail in _TAILS]
+    tested = is_tested(
+        found[0].posterior.case.records,
+        deformation=asked.deformation,
+        temperature=asked.temperature,
+        sense=sign * SENSE[asked.direction],
+    )
+    above = None
+    if asked.limit_force is not None:
+        above = members.above(asked.limit_force - half)
+    levels = []
+    for row, warm in enumerate(asked.temperature):
+        ends = sorted((sign * float(low[row]), sign * float(high[row])))
+        levels.append(
+            Level(
+                temperature_C=float(warm),
+                tested=bool(tested[row]),
+                force_N=_signed([q[row] for q in mean], sign),
+                member_N=_signed([q[row] for q in member], sign),
+                lower_bound_N=ends[0],
+                upper_bound_N=ends[1],
+                capacity_N=float(capacity[row]),
+                capacity_median_N=float(least[row]),
+                exceedance=None
+                if above is None
+                else _exceedance(above[:, row], weight, found, asked.confidence),
+            )
+        )
+    return tuple(levels)
+
+
+def _signed(quantiles: Sequence[float], sign: int) -> Interval:
+    low, middle, high = (sign * float(value) for value in quantiles)
+    return Interval(median=middle, lo=min(low, high), hi=max(low, high))
+
+
+def _outer(level: Level | ModelBound, sign: int) -> float:
+    """Return the larger bound in size, along the direction of loading [N]."""
+    return level.upper_bound_N if sign > 0 else -level.lower_bound_N
+
+
+def _exceedance(
+    above: np.ndarray, weight: np.ndarray, found: Sequence[Model], confidence: float
+) -> Exceedance:
+    """Return the probability of exceedance from the share above in each draw."""
+    mean = float(weight @ above)
+    # Each draw counts for less where draws depend on each other.
+    less = np.concatenate(
+        [np.full(m.size, (m.size / m.independent_draws) ** 0.5) for m in found]
+    )
+    error = float(np.linalg.norm(less * weight * (above - mean)))
+    independent = 1.0 / sum(m.probability**2 / m.independent_draws for m in found)
+    resolved = error <= _ROUGH * mean and mean >= RAREST
+    if not resolved and error > _ROUGH * mean:
+        mean = min(mean + _UNSEEN / independent, 1.0)
+    elif not resolved:
+        mean = RAREST
+    low, high, sure = over_draws(
+        above[:, None], weight, [_TAILS[0], _TAILS[2], confidence]
+    )[:, 0]
+    return Exceedance(
+        probability=mean,
+        error=error,
+        resolved=resolved,
+        lo=float(low),
+        hi=float(high),
+        at_confidence=float(sure),
+        beta=float(-ndtri(np.clip(mean, 1e-300, 1.0 - 1e-16))),
+    )
+
+
+def _decision(asked: Request, worst: Level, estimate: float, step: float):
+    if asked.limit_force is None or worst.exceedance is None:
+        return None
+    sign, span = asked.direction_of_loading, worst.member_N
+    low, high = sorted((sign * span.lo, sign * span.hi))
+    # The rounding is a component of the interval: it is in the limit only once.
+    numbers = asked.limit_force, sign * estimate, low, high
+    return decide(asked.rule, *numbers, worst.exceedance.probability)
+
+
+def _each_model(
+    found: Sequence[Model], parts: Sequence[Members], asked: Request, step: float
+) -> tuple[ModelBound, ...]:
+    sign, bounds = asked.direction_of_loading, []
+    for model, part in zip(found, parts, strict=True):
+        shares = ((1.0 - asked.content, 1.0 - asked.confidence, -0.5),)
+        shares += ((asked.content, asked.confidence, 0.5),)
+        ends = sorted(
+            sign * (float(over_draws(part.quantile(p), part.weight, [g])[0, 0]) + s * step)
+            for p, g, s in shares
+        )
+        bounds.append(
+            ModelBound(
+                model=model.name,
+                probability=model.probability,
+                lower_bound_N=ends[0],
+                upper_bound_N=ends[1],
+            )
+        )
+    return tuple(bounds)
+
+
+def _data(model: Model) -> Calibrated:
+    case = model.posterior.case
+    return Calibrated(
+        gear=case.gear.name,
+        theory=model.posterior.theory,
+        name=case.name,
+        rows=len(case.records.force),
+        sha256=case.data_sha256,
+    )
+
+
+def _warnings(found: Sequence[Model]) -> tuple[str, ...]:
+    """Return warnings on the noise of the most probable model."""
+    posterior = found[0].posterior
+    words = [fault.words for fault in residuals(posterior).noise]
+    rows = len(posterior.case.records.force)
+    alike = correlation_check(posterior.draws, rows)
+    if alike.outcome == "warning":
+        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
+    return tuple(words)

@@ -1,171 +1,244 @@
-"""The answer of `margin`: what each number in it is."""
+"""Margin as a result: bounds, budget, decision and inverse, with labels and units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from hdcal.notebook import Shown
-from hdcal.prediction.engine.conditions import Direction
-from hdcal.prediction.engine.forces import Quantity
-from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
-from hdcal.prediction.engine.population import Population
-from hdcal.prediction.margin.deformation_reached import DeformationReached
-from hdcal.prediction.margin.gradients import Gradient
-from hdcal.prediction.margin.stated import Chance, Decision, Size, StatedUncertainty
-from hdcal.prediction.margin.variance_shares import VarianceShare
-from hdcal.prediction.shares import BASES
-from hdcal.quantities import FORCE
-from hdcal.report.answer import Promise, Real, Sentences, Units, Words
-from hdcal.report.intervals import Interval
+import pandas as pd
+from pydantic import Field, InstanceOf, computed_field
 
-INTERVAL = 0.95
-Fraction = Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
-# Beyond the tested range by more than this share of it a bound rests on an assumption.
-FAR = 0.2
-# One whose ends are all known.
-Span = Annotated[Interval, Promise(additionalProperties={"type": "number"})]
+from hdcal.inference.posterior import Posterior
+from hdcal.prediction.conditions import Direction
+from hdcal.prediction.forces import Quantity
+from hdcal.prediction.margin.budget import BudgetRow
+from hdcal.prediction.margin.charts import budget_chart, force_chart
+from hdcal.prediction.margin.decision import Decision
+from hdcal.prediction.simulate import Population
+from hdcal.report.chart_spec import Chart
+from hdcal.report.item import Count, Interval, Item, Probability, Words, quantity
+from hdcal.report.provenance import data_rows, gear_rows
+from hdcal.report.result import Result
+
+if TYPE_CHECKING:
+    from datetime import date
+
+_MEMBER = {"readings": "reading", "mountings": "mounting", "specimens": "gear"}
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
-@dataclass(frozen=True)
-class Exceedance:
+class Exceedance(Item):
     """How probable it is that a member needs more than the capacity.
 
     Attributes:
-        probability: of one future member, all that is unknown averaged over.
-        lo: lower end of the 95 % interval of the share of the population.
+        probability: of one future member, over all draws; an upper limit with 95 %
+            confidence where the draws do not resolve it.
+        error: Monte Carlo standard error of the probability.
+        resolved: whether the draws resolve the probability.
+        lo: lower end of the 95 % credible interval of the share of the population.
         hi: its upper end.
         at_confidence: share that is not exceeded with the stated confidence.
-        beta: reliability index −Φ⁻¹(P) of the probability.
-        beta_lo: of `hi`.
-        beta_hi: of `lo`.
-        beta_at_confidence: of `at_confidence`.
-        relative_error: Monte Carlo standard error over the probability.
-        rests_on: what a rare one rests on; None where it is not rare.
+        beta: reliability index −Φ⁻¹(P); a lower limit where P is an upper one.
     """
 
-    probability: Chance
-    lo: Chance
-    hi: Chance
-    at_confidence: Chance
-    beta: Real
-    beta_lo: Real
-    beta_hi: Real
-    beta_at_confidence: Real
-    relative_error: Real
-    rests_on: Words | None
+    probability: Probability = quantity("probability that a member exceeds the limit")
+    error: float = quantity("Monte Carlo standard error of the probability")
+    resolved: bool = quantity("whether the draws resolve the probability")
+    lo: Probability = quantity("share of members above the limit, lower end")
+    hi: Probability = quantity("share of members above the limit, upper end")
+    at_confidence: Probability = quantity("share of members above, confidence bound")
+    beta: float = quantity("reliability index")
 
 
-@dataclass(frozen=True)
-class Level:
-    """The force at one temperature, or at the worst one of a window.
+class Level(Item):
+    """The force at one temperature.
 
     Attributes:
-        temperature_C: of the specimen.
         tested: the data hold this deformation, temperature and direction.
-        force_N: mean of the population, with its 95 % credible interval.
-        member_N: of one future member, with its 95 % predictive interval.
+        force_N: mean of the population, 95 % credible interval.
+        member_N: one future member, 95 % predictive interval.
         lower_bound_N: exceeded by the share `content`, with the stated confidence.
         upper_bound_N: not exceeded by that share, with that confidence.
-        capacity_N: smallest that meets the required probability, with confidence; as
-            all capacities a size, along the sense of loading.
+        capacity_N: least that holds the required probability, with confidence; a size
+            along the direction of loading.
         capacity_median_N: the same with a confidence of a half.
-        capacity_predictive_N: the same for one future member, all that is unknown
-            averaged over.
-        exceedance: of the given capacity, or None.
     """
 
-    temperature_C: float
-    tested: bool
-    force_N: Span
-    member_N: Span
-    lower_bound_N: float
-    upper_bound_N: float
-    capacity_N: float
-    capacity_median_N: float
-    capacity_predictive_N: float
-    exceedance: Exceedance | None
+    temperature_C: float = quantity("temperature", "°C")
+    tested: bool = quantity("tested")
+    force_N: Interval = quantity("mean", "N")
+    member_N: Interval = quantity("one member", "N")
+    lower_bound_N: float = quantity("lower bound", "N")
+    upper_bound_N: float = quantity("upper bound", "N")
+    capacity_N: float = quantity("required capacity", "N")
+    capacity_median_N: float = quantity("required capacity, 50 % confidence", "N")
+    exceedance: Exceedance | None = quantity("limit exceeded")
 
 
-@dataclass(frozen=True)
-class ModelBound:
-    """What one of several models alone would say.
+class Reached(Item):
+    """The deformation that a force reaches; None where it is not reached in the range.
 
     Attributes:
-        model: effects of the model, joined with +; `none` or `unknown` without any.
-        probability: its weight.
-        lower_bound_N: at the worst temperature.
-        upper_bound_N: likewise.
-        probability_exceeded: predictive, at the worst temperature, or None.
+        searched_mm: range of deformation.
+        median_mm: of the mean member, with the ends of its 95 % credible interval.
+        lower_bound_mm: reached by the share `content`, with the stated confidence.
+        upper_bound_mm: not passed by that share, with that confidence.
+        tested: whether the data hold the whole of it.
     """
 
-    model: str
-    probability: Chance
-    lower_bound_N: float
-    upper_bound_N: float
-    probability_exceeded: Chance | None
+    force_N: float = quantity("given force", "N")
+    temperature_C: float = quantity("temperature", "°C")
+    searched_mm: tuple[float, float]
+    median_mm: float | None = quantity("deformation reached", "mm")
+    lo_mm: float | None = quantity("lower end", "mm")
+    hi_mm: float | None = quantity("upper end", "mm")
+    lower_bound_mm: float | None = quantity("lower bound", "mm")
+    upper_bound_mm: float | None = quantity("upper bound", "mm")
+    tested: bool
 
 
-def sizes_needed(of: Level | ModelBound, sense: LoadingSense) -> tuple[float, float]:
-    """Return what most need at least and at most, along the sense of loading [N]."""
-    return ends_along(of.lower_bound_N, of.upper_bound_N, sense)
+class ModelBound(Item):
+    """Bounds of one of several models alone, at the worst temperature."""
+
+    model: Words = quantity("model")
+    probability: Probability = quantity("probability")
+    lower_bound_N: float = quantity("lower bound", "N")
+    upper_bound_N: float = quantity("upper bound", "N")
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Margin(StatedUncertainty, Shown):
+class Calibrated(Item):
+    """Gear and data of the calibration."""
+
+    gear: str
+    theory: str
+    name: str
+    rows: Count
+    sha256: str
+
+
+class Margin(Result):
     """The force needed at a deformation, and the margin of a capacity.
 
     Attributes:
-        deformation_mm: as read.
         direction: up to load, down to unload.
-        loading_sense: +1 pressed, −1 pulled; capacities and what exceeds them are
-            along it, forces and bounds have their sign.
+        loading_sense: +1 in compression, -1 in tension; capacities and what
+            exceeds them are sizes along it, forces and bounds have their sign.
         quantity: reading of the rig, or load on the gear.
         population: readings, mountings or specimens.
-        population_words: the same in a sentence.
-        basis: A-basis, B-basis, or empty.
-        content: share of the population within each bound, one-sided.
+        content: share of the population within each one-sided bound.
         confidence: of each bound.
-        required_probability: that the capacities are to meet.
-        limit_force_N: capacity asked about, its size, or None.
-        tolerances_mm: ± of the sizes, by name.
+        required_probability: that the capacities hold.
+        limit_force_N: capacity asked about, its size.
+        tolerances_mm: ± of the sizes by name.
         levels: one per temperature.
-        worst: over all temperatures at once.
-        reached: deformation reached by a given force, or None.
-        decision: whether the force keeps the limit, or None without one.
-        models: each model's own bounds, if there are several.
+        worst: the level with the largest bound.
+        estimate_N: estimate of one member there.
+        combined_standard_uncertainty_N: of the estimate.
+        coverage_factor: half width of the coverage interval over this uncertainty.
+        expanded_uncertainty_N: half width of the coverage interval.
+        budget: components of the uncertainty, the largest first.
+        decision: whether the force keeps the limit.
+        reached: deformation that a given force reaches.
+        models: bounds of each model, if there are several.
         causes: probability of each hypothesis that was averaged over.
-        weight_left_out: of it, what lay on hypotheses without a model of their own.
-        gradients: of the bound that is the larger one in size.
-        shares: of the variance of one future member's force.
-        beyond_tested: how far the deformation lies outside the tested range, as a
-            share of that range.
-        extrapolated: what lies outside the data, in sentences.
-        remarks: what else to know, in sentences.
-        units: names and units of what was measured; no part of the JSON answer.
+        weight_left_out: probability of hypotheses that were not calibrated.
+        beyond_tested: distance of the deformation from the tested range, as a share of
+            that range.
+        interval: probability inside the intervals.
+        posterior: of the most probable model.
+        bend_N: mean and sd of the bend at the deformation.
+        averaging: sentences on the hypotheses.
+        warnings: on the residuals and the noise.
+        turn_mm: deformation at which unloading begins.
     """
 
-    deformation_mm: float
+    template = "prediction/margin/report.md.j2"
+    table = "levels"
+
+    format: Literal["hdcal.margin/3"] = "hdcal.margin/3"
+    deformation_mm: float = quantity("deformation", "mm")
     direction: Direction
-    loading_sense: LoadingSense
+    loading_sense: Literal[1, -1]
     quantity: Quantity
     population: Population
-    population_words: Words
-    basis: Annotated[str, Promise(enum=["", *BASES])]
-    content: Fraction
-    confidence: Fraction
-    required_probability: Fraction
-    limit_force_N: float | None
-    tolerances_mm: Mapping[str, Size]
-    levels: Annotated[tuple[Level, ...], Promise(minItems=1)]
+    content: Share
+    confidence: Share
+    required_probability: Share
+    limit_force_N: float | None = quantity("limit", "N")
+    tolerances_mm: dict[str, float]
+    levels: Annotated[tuple[Level, ...], Field(min_length=1)]
     worst: Level
-    reached: DeformationReached | None
+    estimate_N: float = quantity("estimate of one member", "N")
+    combined_standard_uncertainty_N: float = quantity("standard uncertainty", "N")
+    coverage_factor: float = quantity("coverage factor")
+    expanded_uncertainty_N: float = quantity("expanded uncertainty", "N")
+    budget: tuple[BudgetRow, ...]
     decision: Decision | None
+    reached: Reached | None
     models: tuple[ModelBound, ...]
-    causes: Mapping[str, Chance]
-    weight_left_out: Chance
-    gradients: tuple[Gradient, ...]
-    shares: tuple[VarianceShare, ...]
-    beyond_tested: Size
-    extrapolated: Sentences
-    remarks: Sentences
-    units: Units = FORCE
+    causes: dict[str, Probability]
+    weight_left_out: Probability
+    beyond_tested: float
+    interval: Share
+    seed: Count
+    versions: dict[str, str]
+    data: Calibrated
+    posterior: InstanceOf[Posterior] = Field(exclude=True)
+    bend_N: tuple[float, float] = Field(exclude=True)
+    averaging: tuple[str, ...] = Field(exclude=True)
+    warnings: tuple[str, ...] = Field(exclude=True)
+    turn_mm: float = Field(exclude=True)
+
+    @computed_field
+    @property
+    def extrapolated(self) -> tuple[Words, ...]:
+        """What lies outside the data."""
+        return self.lines("extrapolated")
+
+    @computed_field
+    @property
+    def remarks(self) -> tuple[Words, ...]:
+        """What else the numbers depend on."""
+        return self.lines("remarks")
+
+    @property
+    def member(self) -> str:
+        """Word for one member of the population."""
+        return _MEMBER[self.population]
+
+    @property
+    def members(self) -> str:
+        """Word for several members of the population."""
+        return f"{self.member}s"
+
+    @property
+    def step_N(self) -> float:
+        """Step of the reading, 0 for a load [N]."""
+        step = float(self.posterior.problem.step)
+        return step if self.quantity == "reading" else 0.0
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """Gear, sizes and data in words."""
+        case = self.posterior.case
+        return dict(gear_rows(case, self.posterior.theory)) | dict(data_rows(case))
+
+    def budget_frame(self) -> pd.DataFrame:
+        """Return the uncertainty budget as a table."""
+        return pd.DataFrame([row.columns() for row in self.budget])
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the force with its bounds, and the budget."""
+        return {"margin": force_chart(self), "budget": budget_chart(self)}
+
+    def certificate(self, issued: "date") -> str:
+        """Return the certificate as the text of an HTML page of one A4 sheet.
+
+        Args:
+            issued: date of issue.
+
+        Raises:
+            NotUsable: the calibration failed its checks.
+        """
+        from hdcal.report.page import sheet_page
+
+        self.posterior.require_usable()
+        return sheet_page(self, "certificate", {"date of issue": issued.isoformat()})

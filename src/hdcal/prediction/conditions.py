@@ -1,20 +1,18 @@
-"""The conditions of a force: where, how warm, which way, and what was tested of it."""
+"""Conditions of a force: deformation, temperature, direction; and what was tested."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.plausible import implausible
-from hdcal.data.records import Array, Records
+from hdcal.data.records import Records
 from hdcal.errors import Finding
 from hdcal.inference.values import Values
-from hdcal.prediction.engine.sizes import StiffnessStrata
-from hdcal.prediction.engine.untested import Untested
+from hdcal.prediction.forces import Quantity
 from hdcal.quantities import FORCE, Quantities
 
 Direction = Literal["up", "down"]
@@ -32,68 +30,87 @@ _OFF = 100.0
 _MOST_LOSS = 0.5
 
 
-class Conditions(eqx.Module):
-    """Under which conditions a force is asked for.
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions of n forces.
 
     Attributes:
-        deformation: as read [mm].
-        temperature: of the specimen [°C].
-        known_sd: stated sd of a reading [N].
-        untested: what is not known beyond the tested conditions.
-        scale: stiffness over that of the calibrated gear [-]: other sizes, modulus, K.
-        strata: of the stiffness within the tolerances of the sizes.
-        loading: sense of loading, +1 or −1.
-        down: whether the deformation is reached by unloading.
+        deformation: as read, or true for a load [mm], (n,).
+        temperature: of the specimen [°C], (n,).
+        loading: direction of loading, +1 in compression and -1 in tension, (n,).
+        unloading: whether the deformation is reached from a larger one, (n,).
+        quantity: which force.
+        tolerances: ± of the sizes by field of the geometry [mm].
+        factor: stiffness relative to the tested gear's [-], scalar or (n,).
     """
 
-    deformation: Float[Array, ""] | float
-    temperature: Float[Array, ""] | float
-    known_sd: Float[Array, ""] | float
-    untested: Untested
-    scale: Float[Array, ""] | float
-    strata: StiffnessStrata
-    loading: Float[Array, ""] | float
-    down: bool = eqx.field(static=True)
+    deformation: np.ndarray
+    temperature: np.ndarray
+    loading: np.ndarray
+    unloading: np.ndarray
+    quantity: Quantity | Literal["gear"] = "reading"
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    factor: np.ndarray | float = 1.0
+
+    @classmethod
+    def of(
+        cls, deformation, temperature, loading=1.0, unloading=False, **more
+    ) -> "Conditions":
+        """Return conditions of numbers and arrays that broadcast to (n,)."""
+        columns = np.broadcast_arrays(
+            np.atleast_1d(np.asarray(deformation, float)),
+            np.asarray(temperature, float),
+            np.asarray(loading, float),
+            np.asarray(unloading, bool),
+        )
+        return cls(*columns, **more)
 
     @property
-    def low(self) -> Float[Array, ""] | float:
-        """Low end of the tested deformation [mm]."""
-        return self.untested.below.end
+    def size(self) -> int:
+        """Number of conditions."""
+        return len(self.deformation)
 
     @property
-    def high(self) -> Float[Array, ""] | float:
-        """Its high end [mm]."""
-        return self.untested.above.end
+    def movement(self) -> np.ndarray:
+        """+1 where the deformation as read rises, -1 where it falls, (n,)."""
+        return np.where(self.unloading, -self.loading, self.loading)
 
-    @property
-    def movement(self) -> Float[Array, ""] | float:
-        """Sense of the movement: +1 where the deformation as read rises."""
-        return -self.loading if self.down else self.loading
+    def turn(self, records: Records) -> np.ndarray:
+        """Return where unloading begins [mm], (n,).
 
-    @property
-    def turn(self) -> Float[Array, ""]:
-        """Where unloading begins: at the farthest tested deformation, or here [mm]."""
-        return turning_point(self.deformation, self.loading, self.low, self.high)
+        At the largest tested deformation, or here where that is larger.
+        """
+        tested = np.where(
+            self.loading > 0.0,
+            np.max(records.deformation),
+            np.min(records.deformation),
+        )
+        farthest = np.maximum(self.loading * tested, self.loading * self.deformation)
+        return self.loading * farthest
 
 
-def turning_point(deformation, loading, low, high):
-    """Return where unloading begins: at the farthest tested deformation, or here [mm].
+def beyond_tested(deformation: float, records: Records) -> float:
+    """Return how far a deformation lies outside the tested range, as a share of it."""
+    low, high = float(np.min(records.deformation)), float(np.max(records.deformation))
+    beyond = max(low - deformation, deformation - high, 0.0)
+    return beyond / (high - low) if beyond > NEAR_MM else 0.0
+
+
+def direction_of_loading(models, deformation: float) -> int:
+    """Return +1 where the gear is pressed at a deformation, -1 where it is pulled.
+
+    It is the sign of the gear's own deformation, the zero of the gauge taken off, in
+    the larger share of the draws.
 
     Args:
-        deformation: at which it ends [mm].
-        loading: sense of loading, +1 or −1.
-        low: low end of the tested deformation [mm].
-        high: its high end [mm].
+        models: with their probabilities.
+        deformation: as read [mm].
     """
-    tested = jnp.where(loading > 0.0, high, low)
-    return loading * jnp.maximum(loading * tested, loading * deformation)
-
-
-def beyond_tested(where: Conditions) -> float:
-    """Return how far a deformation lies outside the tested range, as a share of it."""
-    at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
-    beyond = max(low - at, at - high, 0.0)
-    return beyond / (high - low) if beyond > NEAR_MM else 0.0
+    pressed = sum(
+        model.probability * np.mean(model.draws["deformation_offset"] <= deformation)
+        for model in models
+    )
+    return 1 if pressed >= 0.5 else -1
 
 
 def usual_temperature(case: Case) -> float:
@@ -109,7 +126,7 @@ def usual_sd(records: Records) -> float:
 
 
 def is_tested(records: Records, *, deformation, temperature, sense) -> np.ndarray:
-    """Tell where the data hold a deformation, a temperature and a direction.
+    """Return where the data hold a deformation, a temperature and a direction.
 
     Args:
         records: the data.
@@ -125,7 +142,7 @@ def is_tested(records: Records, *, deformation, temperature, sense) -> np.ndarra
 
 
 def temperature_is_tested(records: Records, temperature) -> np.ndarray:
-    """Tell which temperatures [°C] lie within those of the data."""
+    """Return which temperatures [°C] lie within those of the data."""
     return _within(temperature, records.temperature, NEAR_K)
 
 

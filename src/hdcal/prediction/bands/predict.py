@@ -1,0 +1,351 @@
+"""Bands on the predicted force.
+
+A prediction is an immediate reading: no time passes, so that leakage and other slow
+effects have not begun.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, computed_field
+from scipy.special import ndtri
+
+from hdcal.data.case import Case
+from hdcal.data.plausible import implausible
+from hdcal.data.records import Records, lies_far
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, Findings, InputError
+from hdcal.prediction.bands.charts import bands_chart
+from hdcal.prediction.conditions import (
+    DIRECTIONS,
+    SENSE,
+    Conditions,
+    Direction,
+    excluded_findings,
+    far_findings,
+    is_tested,
+    temperature_findings,
+    usual_temperature,
+)
+from hdcal.prediction.members import over_draws
+from hdcal.prediction.models import (
+    Model,
+    Models,
+    averaging_words,
+    left_out_of,
+    models_of,
+    probabilities,
+)
+from hdcal.prediction.simulate import simulate_all, widest
+from hdcal.report.chart_spec import Chart
+from hdcal.report.item import Draws, Interval, Probability, Words, quantity
+from hdcal.report.result import Result
+
+# Rows predicted at a time: with 4000 draws each array of a block takes 32 MB.
+_BLOCK = 1000
+# More temperatures than this are shown at three over their range; those of one room
+# are one temperature [K].
+_MOST_TEMPERATURES, _SAME_TEMPERATURE = 6, 3.0
+
+
+class Bands(Result):
+    """Equal-tailed bands of the force as read, with one entry per row.
+
+    Attributes:
+        deformation_mm: as read.
+        temperature_C: of the specimen.
+        direction: up or down.
+        physics_lo_N: credible band of the mean reading.
+        with_gap_lo_N: credible band with the leftover discrepancy; NaN if not fitted.
+        new_measurement_lo_N: predictive band of one more reading, on a new run and a
+            new specimen where these were fitted, with the rounding of the rig.
+        tested: deformation, temperature and direction lie within the data.
+        usable: the calibration passed its checks.
+        straight_N: median of the model without the bend that the readings leave
+            possible.
+        interval: probability inside the bands.
+        causes: probability of each hypothesis that was averaged over.
+        weight_left_out: probability of hypotheses that were not calibrated.
+        averaging: sentences on these.
+        tested_range: deformations, temperatures and directions of the data, in words.
+    """
+
+    template = "prediction/bands/report.md.j2"
+    table = "columns"
+
+    format: Literal["hdcal.prediction/1"] = "hdcal.prediction/1"
+    deformation_mm: Draws = quantity("deformation", "mm")
+    temperature_C: Draws = quantity("temperature", "°C")
+    direction: Draws = quantity("direction")
+    physics_lo_N: Draws = quantity("mean, lower end", "N")
+    physics_median_N: Draws = quantity("mean", "N")
+    physics_hi_N: Draws = quantity("mean, upper end", "N")
+    with_gap_lo_N: Draws = quantity("with the leftover, lower end", "N")
+    with_gap_median_N: Draws = quantity("with the leftover", "N")
+    with_gap_hi_N: Draws = quantity("with the leftover, upper end", "N")
+    new_measurement_lo_N: Draws = quantity("one new reading, lower end", "N")
+    new_measurement_median_N: Draws = quantity("one new reading", "N")
+    new_measurement_hi_N: Draws = quantity("one new reading, upper end", "N")
+    tested: Draws = quantity("tested")
+    usable: Draws = quantity("usable")
+    straight_N: Draws
+    interval: float = Field(gt=0.0, lt=1.0)
+    causes: dict[str, Probability]
+    weight_left_out: Probability
+    averaging: tuple[str, ...] = Field(exclude=True)
+    tested_range: str = Field(exclude=True)
+
+    @computed_field(json_schema_extra={"additionalProperties": {"type": "array"}})
+    @property
+    def columns(self) -> dict[str, tuple[Any, ...]]:
+        """Columns of the table by name."""
+        names = {self.units.key(name): name for name in COLUMNS}
+        found = {key: getattr(self, name).tolist() for key, name in names.items()}
+        return {
+            key: tuple(None if value != value else value for value in values)
+            for key, values in found.items()
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table of bands.csv."""
+        columns = {self.units.key(name): getattr(self, name) for name in COLUMNS}
+        return pd.DataFrame(columns)
+
+    @property
+    def untested(self) -> int:
+        """Number of rows outside the data."""
+        return int(np.sum(~self.tested))
+
+    @property
+    def mean_N(self) -> Interval:
+        """Mean force at the first row."""
+        ends = (self.physics_median_N, self.physics_lo_N, self.physics_hi_N)
+        median, lo, hi = (float(end[0]) for end in ends)
+        return Interval(median=median, lo=lo, hi=hi)
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return force over deformation."""
+        return {"bands": bands_chart(self)}
+
+
+# Columns of bands.csv, in their order.
+COLUMNS = tuple(
+    name
+    for name, field in Bands.model_fields.items()
+    if field.exclude and field.title
+)
+
+
+def predict(
+    models: Models,
+    deformation: Sequence[float] | np.ndarray,
+    temperature: Sequence[float] | np.ndarray | None = None,
+    direction: Direction | None = None,
+    *,
+    interval: float = 0.95,
+    seed: int = 0,
+    allow_failed: bool = False,
+) -> Bands:
+    """Predict the force at every pair of deformation and temperature.
+
+    Args:
+        models: from `calibrate`, `diagnose` or `Posterior.load`; or several posteriors,
+            each with the probability of its model.
+        deformation: as read [mm], shape (n,).
+        temperature: of the specimen [°C], shape (t,); by default the tested one
+            nearest to the reference.
+        direction: of the movement, for effects that depend on it: up where the
+            deformation rises, as read and with its sign; by default the one that
+            loads the gear.
+        interval: probability inside the bands.
+        seed: of what the draws leave open.
+        allow_failed: also for a posterior that failed; the rows then say so.
+
+    Returns:
+        Bands with t · n rows, deformation varying fastest.
+
+    Raises:
+        NotUsable: the posterior failed its checks.
+        InputError: empty or non-finite input.
+    """
+    found = models_of(models, allow_failed=allow_failed)
+    case = found[0].posterior.case
+    warm = usual_temperature(case) if temperature is None else temperature
+    along = _numbers("deformation", deformation)
+    levels = _numbers("temperature", warm)
+    with Findings() as wrong:
+        wrong += _deformation_findings(case, along, direction)
+        wrong += _temperature_findings(found[0], levels)
+        wrong += implausible("interval", interval) + implausible("seed", seed)
+        if direction not in (None, *DIRECTIONS):
+            words = f"'{direction}' is unknown"
+            wrong.append(Finding("direction", words, "use up or down"))
+    at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
+    loading = _loading(at, case.records)
+    sense = loading if direction is None else np.full(len(at), SENSE[direction])
+    tails = [0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0]
+    blocks = []
+    for start in range(0, len(at), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        place = Conditions.of(
+            at[rows], warm[rows], loading[rows], (sense != loading)[rows]
+        )
+        blocks.append(_quantiles(found, place, tails, seed))
+    mean, new, straight = (
+        np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
+    )
+    leftover = any(model.problem.discrepancy is not None for model in found)
+    usable = all(model.posterior.usable for model in found)
+    without = np.full_like(mean, np.nan)
+    columns = np.concatenate([mean, mean if leftover else without, new])
+    bands = [name for name in COLUMNS if name.endswith("_N")]
+    return Bands(
+        **dict(zip(bands, columns, strict=True)),
+        deformation_mm=at,
+        temperature_C=warm,
+        direction=np.where(sense > 0.0, "up", "down"),
+        tested=is_tested(case.records, deformation=at, temperature=warm, sense=sense),
+        usable=np.full(len(at), usable),
+        straight_N=straight,
+        interval=interval,
+        causes=probabilities(found),
+        weight_left_out=left_out_of(models),
+        averaging=tuple(averaging_words(models)),
+        tested_range=_range_words(case),
+        part="part" if case.gear.theory == SPRING else "gear",
+        units=case.units,
+    )
+
+
+def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
+    """Return quantiles of the mean and of a new reading, and the straight median [N].
+
+    Shapes (3, row), (3, row) and (row,).
+    """
+    problem = models[0].problem
+    # The mean is that of the tested gears and mountings, a new reading of a new one.
+    tested = members = simulate_all(models, at, seed=seed)
+    if widest(problem) != "readings":
+        members = simulate_all(models, at, widest(problem), seed=seed)
+    rng, count = np.random.default_rng(seed), len(members.weight)
+    even = (np.arange(count) + 0.5) / count
+    levels, scores, rounding = (rng.permutation(even) for _ in range(3))
+    new = members.sample(levels, ndtri(scores))
+    new += float(problem.step) * (rounding - 0.5)[:, None]
+    centre = tested.centre
+    straight = centre - tested.common["leftover"]
+    found = []
+    for values, shares in ((centre, tails), (new, tails), (straight, [0.5])):
+        quantiles = over_draws(at.loading * values, members.weight, shares)
+        found.append(quantiles)
+    return found[0], found[1], found[2][0]
+
+
+def _numbers(name: str, given: Any) -> np.ndarray:
+    """Return what was asked as an array of numbers, shape (n,)."""
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim == 1:
+        return found
+    remedy = "Give numbers one by one, as in [0.2, 0.4], or a column of a table"
+    raise InputError([Finding(name, "is no list of numbers", remedy)])
+
+
+def _loading(at: np.ndarray, records: Records) -> np.ndarray:
+    """Return the direction of loading of each row, +1 where the deformation rises."""
+    # A gear at rest is loaded as the tested one was.
+    tested = np.min(records.deformation) + np.max(records.deformation)
+    return np.where(np.where(at == 0.0, tested, at) < 0.0, -1.0, 1.0)
+
+
+def _deformation_findings(
+    case: Case, deformation: np.ndarray, direction: str | None
+) -> list[Finding]:
+    """Return what is wrong with deformations [mm], such as another unit."""
+    name, tested = "deformation", np.asarray(case.records.deformation)
+    unit = case.units.displacement_unit
+    if deformation.size == 0:
+        return [Finding(name, "is empty", f"give numbers in {unit}")]
+    if wrong := implausible(name, deformation, case.units.displacement):
+        return wrong
+    worst = float(np.max(np.abs(deformation)))
+    if worst >= case.gear.reach:
+        words = f"{worst:g} mm on a radius of {case.gear.geometry.radius:g} mm"
+        return [Finding(name, words, "Give it in mm")]
+    wrong = far_findings(worst, float(np.max(np.abs(tested))), unit=unit)
+    sense = SENSE.get(direction or "", _loading(deformation, case.records))
+    each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
+    return wrong + next(filter(None, each), [])
+
+
+def _temperature_findings(model: Model, temperature: np.ndarray) -> list[Finding]:
+    if temperature.size == 0:
+        return [Finding("temperature", "is empty", "give numbers in °C")]
+    return temperature_findings(model.posterior.case.gear, model.draws, temperature)
+
+
+def _range_words(case: Case) -> str:
+    """Return the tested deformations, temperatures and directions in words."""
+    records = case.records
+    low, high = np.min(records.deformation), np.max(records.deformation)
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    ways = [n for n in DIRECTIONS if SENSE[n] in np.asarray(records.sense)]
+    return (
+        f"{low:g} … {high:g} {case.units.displacement_unit}, {cold:g} … {warm:g} °C, "
+        f"{' and '.join(ways)}"
+    )
+
+
+def default_bands(models: Models, interval: float = 0.95) -> Bands:
+    """Return the bands of a result folder: the tested range and a tenth beyond.
+
+    One block per tested temperature (three over the range if there are many, one of
+    a room's) and per direction that was tested.
+
+    Args:
+        models: a posterior, or several with probabilities, over which bands average.
+        interval: probability inside the bands.
+    """
+    case = models_of(models, allow_failed=True)[0].posterior.case
+    grid, levels = _default_grid(case), _default_temperatures(case.records)
+    parts = [
+        predict(models, grid, levels, side, interval=interval, allow_failed=True)
+        for side in DIRECTIONS
+        if SENSE[side] in np.asarray(case.records.sense)
+        and SENSE[side] != case.excluded_sense
+    ]
+    whole = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in (*COLUMNS, "straight_N")
+    }
+    return parts[0].model_copy(update=whole)
+
+
+def _default_grid(case: Case) -> np.ndarray:
+    records, nominal = case.records, case.gear.nominal_deformation
+    ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
+    ends += [] if lies_far(records) else [0.0]
+    ends += [] if nominal is None else [nominal]
+    low, high = min(ends), max(ends)
+    beyond = 0.1 * (high - low)
+    # Not beyond an end that is the unloaded gear and no tested deformation.
+    low, high = low - beyond * float(low != 0.0), high + beyond * float(high != 0.0)
+    for left, right in case.excluded:
+        low, high = (low, left) if left >= ends[1] else (right, high)
+    ends = [end for end in ends if low <= end <= high]
+    # With the ends of the data themselves, so that the tested range shows whole.
+    return np.union1d(np.linspace(low, high, 67), ends)
+
+
+def _default_temperatures(records: Records) -> np.ndarray:
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    # Rounded together, but never out of what was measured.
+    levels = np.unique(np.clip(np.round(records.temperature, 1), cold, warm))
+    three = np.linspace(levels[0], levels[-1], 3)
+    if warm - cold < _SAME_TEMPERATURE:
+        return three[1:2]
+    return three if len(levels) > _MOST_TEMPERATURES else levels

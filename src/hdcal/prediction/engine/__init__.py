@@ -1,1 +1,0 @@
-"""The one engine for forces: whose, under which conditions, over which causes."""

@@ -1,0 +1,183 @@
+"""Bend of the force that the readings leave possible, inside and beyond their range.
+
+The bend is a Gaussian process with free slope and curvature: an integrated plus a twice
+integrated Wiener process, the laws behind cubic and quintic smoothing splines (Wahba,
+J. R. Stat. Soc. B 40, 1978). It starts at the far end of the tested range. What a
+straight line absorbs is removed, because offset and stiffness already carry it. Its
+size is inferred from the residuals of the readings.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import softmax
+
+from hdcal.data.records import Records
+from hdcal.exported import jit
+from hdcal.inference.likelihood import row_precision
+from hdcal.inference.padding import pad_records
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values, predict_rows, with_rounding
+
+# Sizes of the bend as shares of the force range, sds of noise as shares of that of the
+# residuals. A size above ORDINARY is less probable: in the prior tables the stiffness
+# changes by some 20 % over the range.
+SIZES, ORDINARY = np.geomspace(1e-3, 3.0, 14), 0.1
+NOISES = np.geomspace(0.1, 1.2, 10)
+# Residuals are averaged at so many places.
+KNOTS = 48
+# Part of the tested range over which the bend takes the place of a fitted leftover.
+FADE = 0.03
+# Least sd of the noise as a share of the force range: readings may have been computed.
+LEAST_NOISE, LEAST_RANGE = 1e-6, 1e-9
+
+
+@dataclass(frozen=True)
+class Bend:
+    """The bend towards and beyond one end of the tested deformation.
+
+    Attributes:
+        end: towards which it grows [mm].
+        far: the other end [mm].
+        knots: places with residuals, 0 at the far end and 1 at the end, (k,).
+        line: weights of the residuals in the line that offset and stiffness absorb,
+            (2, k).
+        axes: directions of the residuals that no line absorbs, (k, m).
+        found: the residuals along these directions [N], (m,).
+        size: of the bend under each law [N], (g,).
+        spread: variance along each direction under each law [N²], (m, g).
+        chances: probability of each law, (g,).
+    """
+
+    end: float
+    far: float
+    knots: np.ndarray
+    line: np.ndarray
+    axes: np.ndarray
+    found: np.ndarray
+    size: np.ndarray
+    spread: np.ndarray
+    chances: np.ndarray
+
+    def place(self, deformation: np.ndarray) -> np.ndarray:
+        """Return 0 at the far end of the tested range, 1 at the end [-]."""
+        return (np.asarray(deformation) - self.far) / (self.end - self.far)
+
+    def beyond(self, deformation: np.ndarray) -> np.ndarray:
+        """Return the share of the bend that acts beside a fitted leftover [-].
+
+        The leftover covers the tested range, and the bend replaces it beyond the end.
+        """
+        over = np.maximum(self.place(deformation) - 1.0, 0.0) / FADE
+        return -np.expm1(-(over**2))
+
+    def law(self, deformation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and sd of the bend under each law [N], (g, n) each.
+
+        Args:
+            deformation: as read [mm], shape (n,).
+        """
+        at = np.maximum(self.place(deformation), 0.0)
+        lines = np.stack([np.ones_like(at), at], axis=1) @ self.line
+        to_knots = covariance(at, self.knots)
+        among = covariance(self.knots, self.knots)
+        cross = (to_knots - lines @ among) @ self.axes
+        prior = covariance(at, at, pairs=False)
+        prior += np.sum(lines * (lines @ among - 2.0 * to_knots), axis=1)
+        square = self.size[:, None] ** 2
+        mean = square * ((self.found / self.spread.T) @ cross.T)
+        taken = square * ((1.0 / self.spread.T) @ (cross.T**2))
+        return mean, np.sqrt(np.maximum(square * (prior - taken), 0.0))
+
+    def draw(
+        self, deformation: np.ndarray, level: np.ndarray, score: np.ndarray
+    ) -> np.ndarray:
+        """Return the bend of each draw [N], shape (d, n).
+
+        Args:
+            deformation: as read [mm], shape (n,).
+            level: selects a law by its probability, between 0 and 1, (d,).
+            score: place within this law, standard normal, (d,) or (d, n).
+        """
+        mean, sd = self.law(deformation)
+        law = np.searchsorted(np.cumsum(self.chances)[:-1], level)
+        return mean[law] + sd[law] * np.reshape(score, (len(level), -1))
+
+
+def fit_bends(posterior: Posterior) -> tuple[Bend, Bend]:
+    """Return the bends towards the low and the high end of the tested deformation.
+
+    Args:
+        posterior: whose model leaves residuals of the tested rows.
+    """
+    records = posterior.case.records
+    middle = {name: values.mean(axis=0) for name, values in posterior.draws.items()}
+    middle.pop("gap_weights", None)
+    padded = pad_records(records)
+    residual, precision = (
+        np.asarray(column)[: len(records.force)]
+        for column in _residuals(posterior.problem, middle, padded)
+    )
+    deformation = np.asarray(records.deformation)
+    low, high = float(deformation.min()), float(deformation.max())
+    change = max(abs(float(middle["stiffness"]) * (high - low)), LEAST_RANGE)
+    precision = np.nan_to_num(precision, nan=np.inf)
+    precision = np.minimum(precision, (LEAST_NOISE * change) ** -2)
+    rows = deformation, residual, precision / precision.mean(), change
+    return _fitted(low, high, *rows), _fitted(high, low, *rows)
+
+
+def _fitted(end: float, far: float, deformation, residual, weight, change) -> Bend:
+    place, rows = (deformation - far) / (end - far), len(residual)
+    _, knot = np.unique(np.round(place * (KNOTS - 1)), return_inverse=True)
+    total = np.bincount(knot, weight)
+    knots, mean = (
+        np.bincount(knot, weight * column) / total for column in (place, residual)
+    )
+    within = weight @ (residual - mean[knot]) ** 2
+    # Directions of the weighted residuals that no straight line absorbs.
+    root = np.sqrt(total)
+    columns = np.stack([np.ones_like(knots), knots], axis=1)
+    line = np.linalg.pinv(root[:, None] * columns) * root
+    off = root[:, None] * (np.eye(len(root)) - columns @ line)
+    strength, axes = np.linalg.eigh(off @ covariance(knots, knots) @ off.T)
+    axes, strength = off.T @ axes[:, 2:], np.maximum(strength[2:], 0.0)
+    found = axes.T @ mean
+    left = np.sqrt((found @ found + within) / max(rows - 2, 1))
+    size, noise = (
+        grid.ravel()
+        for grid in np.meshgrid(
+            change * SIZES, np.maximum(left, LEAST_NOISE * change) * NOISES
+        )
+    )
+    spread = size**2 * strength[:, None] + noise**2
+    misfit = np.sum(np.log(spread) + found[:, None] ** 2 / spread, axis=0)
+    unusual = np.log(np.maximum(size / (ORDINARY * change), 1.0))
+    log_chance = -0.5 * (misfit + within / noise**2 + unusual**2)
+    log_chance -= (rows - len(knots)) * np.log(noise)
+    return Bend(
+        end, far, knots, line, axes, found, size, spread, softmax(log_chance)
+    )
+
+
+def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.ndarray:
+    """Return the covariance of a bend of size 1 between places.
+
+    Args:
+        one: places, (k,).
+        other: places, (n,).
+        pairs: between all pairs, (k, n); or else of the i-th with the i-th, (k,).
+    """
+    one = one[:, None] if pairs else one
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    once = low**2 * (high / 2.0 - low / 6.0)
+    return once + low**3 * (high**2 / 12.0 - low * high / 24.0 + low**2 / 120.0)
+
+
+@jit
+def _residuals(problem: Problem, values: Values, records: Records):
+    """Return what a straight model leaves of each row [N], and its precision."""
+    mean, noise = predict_rows(problem, values, records, None)
+    residual = records.force - mean
+    return residual, row_precision(residual, with_rounding(noise, problem.step))

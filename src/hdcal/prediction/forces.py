@@ -1,0 +1,173 @@
+"""Force that one draw predicts for one gear in one mounting, in JAX."""
+
+from dataclasses import replace
+from typing import Literal, get_args
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.records import Array, Records
+from hdcal.exported import jit
+from hdcal.inference.gauges import acting, shown
+from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values, build_effects, member_base
+from hdcal.physics.chain import predict_reading
+from hdcal.physics.effect import Noise
+
+# A reading is what the rig's force gauge shows, with its zero and its errors; the load
+# acts on the mounted gear; `gear` is the load on a gear outside any rig.
+Quantity = Literal["reading", "load"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+# Stages of the effects that belong to the gear: mounted in the rig, and by itself.
+_STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"force"})}
+
+
+def grid_records(deformation, temperature, sense, known_sd, gear=None) -> Records:
+    """Return rows that were not measured: immediate readings after a reset.
+
+    Args:
+        deformation: as read [mm], shape (n,).
+        temperature: of the specimen [°C], shape (n,).
+        sense: +1 where the deformation rises, -1 where it falls, shape (n,).
+        known_sd: known measurement sd of a row [N].
+        gear: index of the gear of a row, each in a mounting of its own, shape (n,); by
+            default each row is of another gear, without memory of the other rows.
+    """
+    zeros = np.zeros(len(deformation))
+    index = np.arange(len(deformation)) if gear is None else gear
+    return Records(
+        deformation=deformation,
+        temperature=temperature,
+        time=zeros,
+        angle=zeros,
+        direction=sense,
+        sense=sense,
+        rate=zeros,
+        run=index,
+        specimen=index,
+        force=zeros,
+        force_sd=zeros + known_sd,
+        known=frozenset(),
+    )
+
+
+def force_of(
+    problem: Problem,
+    values: Values,
+    records: Records,
+    *,
+    factor: Float[Array, "*n"] | float = 1.0,
+    moved: Float[Array, "*n"] | float = 0.0,
+    quantity: Quantity | Literal["gear"] = "reading",
+) -> tuple[Float[Array, " n"], Noise]:
+    """Compute mean force and noise of one draw, without the leftover discrepancy.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        records: from `grid_records`; for a load or a gear at true deformations and
+            temperatures, without the errors of the gauges.
+        factor: stiffness relative to the tested gear's [-].
+        moved: radial deformation that a warmer frame gains [mm].
+        quantity: `reading` has the zero of the force and the effects of the sensor;
+            `load` lacks them and the gain of the gauge; `gear` also lacks the zero of
+            the deformation and the compliance of the rig.
+
+    Returns:
+        Mean force [N], and the noise of a reading of it.
+    """
+    effects = build_effects(problem, values)
+    base = member_base(problem, values)
+    offset = base.deformation_offset - moved / problem.reading.radial_per_read
+    base = replace(
+        base, stiffness=base.stiffness * factor, deformation_offset=offset
+    )
+    if quantity == "reading":
+        return predict_reading(base, effects, records, problem.reading)
+    base = replace(base, force_offset=jnp.zeros_like(base.force_offset))
+    if quantity == "gear":
+        base = replace(base, deformation_offset=jnp.zeros_like(offset))
+    effects = tuple(e for e in effects if e.stage in _STAGES[quantity])
+    at, warm = shown(values, records.deformation, records.temperature)
+    records = replace(records, deformation=at, temperature=warm)
+    force, noise = predict_reading(base, effects, records, problem.reading)
+    return acting(values, force), noise
+
+
+@jit(static_argnames=("quantity", "asked"))
+def forces_of_draws(
+    problem: Problem,
+    draws: Values,
+    path: Records,
+    factor: Float[Array, "draw node 1"],
+    moved: Float[Array, "draw n"],
+    leftover: Float[Array, " asked"],
+    *,
+    quantity: Quantity | Literal["gear"],
+    asked: int,
+):
+    """Compute the force of every draw, its slope by the stiffness, and the noise.
+
+    Args:
+        problem: structure.
+        draws: parameters by site: [draw, …].
+        path: rows that lead to the conditions; the last ones are the conditions.
+        factor: on the stiffness [-].
+        moved: radial deformation that the frame gains at each row of the path [mm].
+        leftover: share of the fitted leftover discrepancy that acts.
+        quantity: which force.
+        asked: number of conditions.
+
+    Returns:
+        Force (draw, node, asked) [N], its derivative by the factor [N], logarithms of
+        the shares of the components of the noise (draw, node, component), and their
+        sds (draw, node, component, asked) [N].
+    """
+
+    def of_draw(value, factor, moved):
+        left = leftover * fitted_leftover(problem, value, path, quantity)[-asked:]
+
+        def force(factor):
+            mean, noise = force_of(
+                problem, value, path, factor=factor, moved=moved, quantity=quantity
+            )
+            total = mean[-asked:] + (left * factor if quantity == "gear" else left)
+            return total, (noise.log_weight, noise.sd[:, -asked:])
+
+        def with_slope(factor):
+            one = jnp.ones_like(factor)
+            mean, slope, noise = jax.jvp(force, (factor,), (one,), has_aux=True)
+            return mean, slope, *noise
+
+        return jax.vmap(with_slope)(factor)
+
+    return jax.vmap(of_draw)(draws, factor, moved)
+
+
+def fitted_leftover(
+    problem: Problem, value: Values, rows: Records, quantity
+) -> Float[Array, " n"]:
+    """Return the fitted leftover discrepancy of one draw [N].
+
+    It is constant beyond the tested deformation.
+
+    Args:
+        problem: structure; without a leftover the result is zero.
+        value: one draw.
+        rows: of which deformation and sense are used.
+        quantity: which force; that of a gear is counted from its free shape.
+    """
+    fitted = problem.discrepancy
+    if fitted is None or "gap_weights" not in value:
+        return jnp.zeros(len(rows.deformation))
+    place = jnp.asarray(rows.deformation)
+    if quantity != "reading":
+        place, _ = shown(value, place, 0.0)
+    if quantity == "gear":
+        place = place + value["deformation_offset"]
+    ends = fitted.centre - fitted.half_range, fitted.centre + fitted.half_range
+    columns = fitted.columns(jnp.clip(place, *ends), jnp.asarray(rows.sense))
+    left = columns @ value["gap_weights"]
+    return left if quantity == "reading" else acting(value, left)

@@ -1,0 +1,105 @@
+"""Inverse of the margin: the deformation that a given force reaches."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.prediction.conditions import NEAR_MM, Conditions
+from hdcal.prediction.margin.request import Request
+from hdcal.prediction.margin.result import Reached
+from hdcal.prediction.members import over_draws
+from hdcal.prediction.models import Model
+from hdcal.prediction.simulate import simulate_all
+from hdcal.report.item import INTERVAL
+
+_TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
+# Searched up to this multiple of the tested deformation, at so many places, in so many
+# draws; between places the force is interpolated.
+_REACH, _PLACES, _DRAWS = 2.0, 65, 1000
+# A deformation of this size is none [mm].
+_NONE = 1e6
+
+
+def deformation_reached(
+    found: Sequence[Model], asked: Request, at: Conditions, warm: float
+) -> Reached | None:
+    """Return the deformation at which the members first need the given force.
+
+    The share of the members that gets beyond a deformation is the share that needs less
+    there. A member reaches the first deformation at which it needs the force.
+
+    Args:
+        found: the models.
+        asked: with the given force; without one there is no answer.
+        at: conditions of the margin.
+        warm: temperature of the answer [°C].
+    """
+    force = asked.given_force
+    if force is None:
+        return None
+    sign = 1 if force > 0.0 else -1
+    records = found[0].posterior.case.records
+    tested = np.sort(sign * np.array([records.deformation.min(), records.deformation.max()]))
+    places = np.linspace(min(0.0, tested[0]), max(0.0, _REACH * tested[1]), _PLACES)
+    there = replace(
+        at,
+        deformation=sign * places,
+        temperature=np.full(_PLACES, warm),
+        loading=np.full(_PLACES, float(sign)),
+        unloading=np.full(_PLACES, asked.direction == "down"),
+    )
+    members = simulate_all(found, there, asked.population, seed=asked.seed).thinned(_DRAWS)
+    step = float(found[0].problem.step) if asked.quantity == "reading" else 0.0
+    half, size, sure = 0.5 * step, abs(force), asked.confidence
+
+    def first(curve: np.ndarray, needed: float, shares: Sequence[float]):
+        place = first_crossing(curve, needed, places)
+        ends = np.clip(place, -1e3 * _NONE, 1e3 * _NONE)
+        found = over_draws(ends[:, None], members.weight, shares)[:, 0]
+        return [sign * float(x) if abs(x) < _NONE else None for x in found]
+
+    middle = first(members.centre, size, _TAILS)[::sign]
+    upper = members.quantile(asked.content)
+    lower = members.quantile(1.0 - asked.content)
+    ends = [
+        first(upper, size - half, [1.0 - sure])[0],
+        first(lower, size + half, [sure])[0],
+    ][::sign]
+    numbers = (*middle, *ends)
+    inside = tested[0] - NEAR_MM, tested[1] + NEAR_MM
+    return Reached(
+        force_N=force,
+        temperature_C=warm,
+        searched_mm=tuple(sorted((sign * float(places[0]), sign * float(places[-1])))),
+        median_mm=middle[1],
+        lo_mm=middle[0],
+        hi_mm=middle[2],
+        lower_bound_mm=ends[0],
+        upper_bound_mm=ends[1],
+        tested=all(x is not None and inside[0] <= sign * x <= inside[1] for x in numbers),
+    )
+
+
+def first_crossing(
+    curve: np.ndarray, needed: float, places: np.ndarray
+) -> np.ndarray:
+    """Return where each curve first reaches a value, by linear interpolation.
+
+    Args:
+        curve: of each draw at the places, (draw, place).
+        needed: the value.
+        places: ascending, (place,).
+
+    Returns:
+        Shape (draw,): infinite where it is never reached, -infinite where the first
+        place is beyond it already.
+    """
+    passed = curve >= needed
+    after = np.maximum(np.argmax(passed, axis=1), 1)
+    rows = np.arange(len(curve))
+    low, high = curve[rows, after - 1], curve[rows, after]
+    share = np.clip((needed - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    found = places[after - 1] + share * (places[after] - places[after - 1])
+    found = np.where(passed.any(axis=1), found, np.inf)
+    return np.where(passed[:, 0], -np.inf, found)

@@ -1,0 +1,170 @@
+"""Calibrated models with their probabilities, over which an answer averages."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+
+from hdcal.errors import Finding, InputError
+from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.prediction.extrapolation import Bend, fit_bends
+from hdcal.report.words import hypothesis, percent
+
+# Sites of the tested members: a future member has none of these values.
+_TESTED = ("run_offset", "specimen_deviation")
+# A smaller probability is the rounding error of a sum.
+_ROUNDING = 1e-6
+
+
+class Averaged(Protocol):
+    """Calibrated models with their probabilities, as a diagnosis holds them."""
+
+    @property
+    def posteriors(self) -> Mapping[str, tuple[float, Posterior]]:
+        """Models by hypothesis, each with its probability."""
+        ...
+
+
+Models = Posterior | Averaged | Sequence[tuple[float, Posterior]]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A calibrated model and its probability.
+
+    Attributes:
+        probability: of the model; those of all models of an answer sum to 1.
+        posterior: from `calibrate`.
+    """
+
+    probability: float
+    posterior: Posterior
+
+    @property
+    def problem(self) -> Problem:
+        """Structure of the model."""
+        return self.posterior.problem
+
+    @cached_property
+    def draws(self) -> dict[str, np.ndarray]:
+        """Parameters by site in code units, without those of tested members."""
+        held = self.posterior.draws.items()
+        return {name: values for name, values in held if name not in _TESTED}
+
+    @property
+    def size(self) -> int:
+        """Number of draws."""
+        return len(self.draws["K"])
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weight of each draw among those of all models."""
+        return np.full(self.size, self.probability / self.size)
+
+    @property
+    def name(self) -> str:
+        """Name among the hypotheses of a diagnosis."""
+        effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
+        rest = UNKNOWN if self.problem.discrepancy is not None else ""
+        return "+".join(filter(None, (effects, rest))) or NONE
+
+    @cached_property
+    def bends(self) -> tuple[Bend, Bend]:
+        """Bends that the readings leave possible, below and above their range."""
+        return fit_bends(self.posterior)
+
+    @property
+    def independent_draws(self) -> float:
+        """Effective number of draws in the tails of the parameters."""
+        sizes = [found.ess_tail for found in self.posterior.diagnoses.values()]
+        return min([self.size, *(size for size in sizes if np.isfinite(size))])
+
+    def driver(self, site: str) -> Literal["data", "prior"]:
+        """Return whether the data or the prior determine a parameter."""
+        found = self.posterior.diagnoses.get(site)
+        return "data" if found is not None and found.driven_by == "data" else "prior"
+
+
+def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
+    """Return models with their probabilities as they were given.
+
+    Raises:
+        InputError: it is no calibrated model, or a diagnosis without any.
+    """
+    if isinstance(models, Posterior):
+        return [(1.0, models)]
+    held = getattr(models, "posteriors", None)
+    if held is None and isinstance(models, Sequence):
+        return models
+    if held:
+        return list(held.values())
+    words = f"{type(models).__name__} is no calibrated model"
+    remedy = "Give what calibrate or diagnose returned, itself"
+    if held is not None:
+        words += " and a quick diagnosis holds none"
+        remedy += "; diagnose without quick"
+    # A fleet, or its posterior.
+    if hasattr(models, "next_force"):
+        remedy = "Ask its own next_force"
+    raise InputError([Finding("models", words, remedy)])
+
+
+def models_of(models: Models, *, allow_failed: bool = False) -> tuple[Model, ...]:
+    """Return models, the most probable first, with probabilities that sum to 1.
+
+    Args:
+        models: a posterior, several with the probabilities of their models, a model
+            average, or a diagnosis.
+        allow_failed: also calibrations that failed their checks.
+
+    Raises:
+        NotUsable: a calibration failed its checks.
+        InputError: there are none, or they are not of the same data.
+    """
+    pairs = model_pairs(models)
+    total = sum(share for share, _ in pairs)
+    if not total > 0.0 or any(share < 0.0 for share, _ in pairs):
+        words, remedy = "hold no probability", "Give (probability, posterior) pairs"
+        raise InputError([Finding("models", words, remedy)])
+    if len({posterior.case.data_sha256 for _, posterior in pairs}) > 1:
+        words, remedy = "are not of the same data", "Give models of one case"
+        raise InputError([Finding("models", words, remedy)])
+    if not allow_failed:
+        for _, posterior in pairs:
+            posterior.require_usable()
+    kept = [Model(share / total, each) for share, each in pairs if share > 0.0]
+    return tuple(sorted(kept, key=lambda model: -model.probability))
+
+
+def probabilities(models: Iterable[Model]) -> dict[str, float]:
+    """Return the probability of each hypothesis, the most probable first."""
+    total: dict[str, float] = {}
+    for model in models:
+        total[model.name] = total.get(model.name, 0.0) + model.probability
+    return dict(sorted(total.items(), key=lambda item: -item[1]))
+
+
+def left_out_of(models: Models) -> float:
+    """Return the probability of hypotheses that a diagnosis did not calibrate."""
+    missing: LeftOut | None = getattr(models, "left_out", None)
+    return 0.0 if missing is None else missing.probability
+
+
+def averaging_words(models: Models) -> list[str]:
+    """Return sentences on the hypotheses of an average and on those left out."""
+    found, words = probabilities(models_of(models, allow_failed=True)), []
+    if len(found) > 1:
+        listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in found.items())
+        words.append(f"This averages over the causes that are left: {listed}.")
+    missing: LeftOut | None = getattr(models, "left_out", None)
+    if missing is not None and missing.probability > _ROUNDING:
+        words.append(
+            f"{percent(missing.probability)} of the probability lies on hypotheses "
+            "that were not calibrated; it counts as "
+            f"{hypothesis(missing.counted_as)}."
+        )
+    return words

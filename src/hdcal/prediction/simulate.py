@@ -1,0 +1,250 @@
+"""Forces of future members of a population, simulated from posterior draws.
+
+Every answer about a future force uses `simulate`: bands, margins, designs, studies,
+responses and tracking.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.special import ndtri
+
+from hdcal.data.full_scale import REFERENCE
+from hdcal.data.priors import effect_priors
+from hdcal.data.records import Records
+from hdcal.errors import Finding
+from hdcal.inference.distributions import moments
+from hdcal.inference.problem import Problem
+from hdcal.prediction.conditions import Conditions, usual_sd
+from hdcal.prediction.forces import forces_of_draws, grid_records
+from hdcal.prediction.members import Members, joined
+from hdcal.prediction.models import Model
+from hdcal.prediction.sizes import size_nodes
+
+Population = Literal["readings", "mountings", "specimens"]
+POPULATIONS: tuple[Population, ...] = get_args(Population)
+# What the draws leave open about all members: standard normal scores of each draw, and
+# `law`, the level at which a law of the bend is selected.
+SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
+# Drifts of the rig with temperature, by the effect whose prior states them.
+DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}
+# Certified errors of gauges: inputs of their own, where a load is asked for.
+CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
+# Parameters that are inputs of their own where the prior determines them.
+SEPARATE = ("alpha", "force_offset")
+
+
+def simulate(
+    model: Model,
+    at: Conditions,
+    population: Population = "readings",
+    *,
+    seed: int = 0,
+) -> Members:
+    """Return the forces of the members of a population in every draw of a model.
+
+    Args:
+        model: whose posterior is simulated.
+        at: conditions of the forces.
+        population: members that differ from each other: readings of the tested gear and
+            mounting, new mountings, or new gears (`specimens`) in new mountings.
+        seed: of the scores of what the draws leave open.
+    """
+    problem, draws, count = model.problem, model.draws, model.size
+    reading, score = at.quantity == "reading", _scores(model.size, seed)
+    gears = problem.specimens if population == "specimens" else 0
+    mountings = problem.runs if population != "readings" and reading else 0
+    none = np.zeros(count)
+    gear_sd = draws["specimen_sd"] if gears else none
+    zero_sd = draws["run_offset_sd"] if mountings else none
+    # The centre of a population lies sd/√n from the mean of the tested members.
+    gear = gear_sd * score["gear"] / max(gears, 1) ** 0.5
+    mounting = zero_sd * score["mounting"] / max(mountings, 1) ** 0.5
+    drift = _drifts(model, at, score)
+    bend, leftover = _bend(model, at, score)
+    theory, tested = model.posterior.theory, model.posterior.case.gear.geometry
+    nodes, node_share = size_nodes(tested, at.tolerances, theory)
+    path = _path(at, model.posterior.case.records)
+    repeats = len(path.deformation) // at.size
+    force, slope, log_share, noise = (
+        np.asarray(found)
+        for found in forces_of_draws(
+            problem,
+            draws,
+            path,
+            ((1.0 + gear)[:, None] * nodes)[:, :, None] * at.factor,
+            np.tile(drift["frame_drift"], repeats),
+            leftover,
+            quantity=at.quantity,
+            asked=at.size,
+        )
+    )
+    along = at.loading * (force + (bend + drift["zero_drift"])[:, None])
+    along = along + mounting[:, None, None]
+    own = (slope * at.factor * nodes[:, None] * gear_sd[:, None, None]) ** 2
+    noise = noise**2 if reading else np.zeros_like(noise[:, :, :1])
+    share = node_share[:, None] * (np.exp(log_share) if reading else 1.0)
+    share = np.broadcast_to(share, noise.shape[:3])
+    variance = noise + (own + zero_sd[:, None, None] ** 2)[:, :, None]
+    mean = np.broadcast_to(along[:, :, None], variance.shape)
+    within = np.einsum("dnk,dnkr->dr", share, noise)
+    scatter = {"noise": within, "gear": np.einsum("n,dnr->dr", node_share, own)}
+    scatter["mounting"] = np.broadcast_to(zero_sd[:, None] ** 2, within.shape)
+    scatter |= _of_sizes(model, at, along, node_share)
+    common = {"gear": gear, "mounting": mounting} | {
+        name: draws[name]
+        for name in (*CERTIFIED, *SEPARATE)
+        if name in draws and model.driver(name) == "prior"
+    }
+    common = {
+        name: np.broadcast_to(values[:, None], within.shape)
+        for name, values in common.items()
+    }
+    common |= {"leftover": at.loading * bend, **drift}
+    return Members(
+        model.weights,
+        share.reshape(count, -1),
+        np.moveaxis(mean, 3, 1).reshape(count, at.size, -1),
+        np.sqrt(np.moveaxis(variance, 3, 1)).reshape(count, at.size, -1),
+        scatter,
+        common,
+    )
+
+
+def simulate_all(
+    models: Sequence[Model],
+    at: Conditions,
+    population: Population = "readings",
+    *,
+    seed: int = 0,
+) -> Members:
+    """Return the forces of the members in every draw of several models, as `simulate`.
+
+    Each draw has the weight of its model; sources of scatter are left out.
+    """
+    return joined([simulate(model, at, population, seed=seed) for model in models])
+
+
+def _path(at: Conditions, records: Records) -> Records:
+    """Return the rows by which the conditions are reached, each in a gear of its own.
+
+    Unloading begins at the largest tested deformation, or here where that is larger.
+    """
+    sd = usual_sd(records)
+    if not at.unloading.any():
+        return grid_records(at.deformation, at.temperature, at.movement, sd)
+    turn = np.where(at.unloading, at.turn(records), at.deformation)
+    return grid_records(
+        np.append(turn, at.deformation),
+        np.tile(at.temperature, 2),
+        np.append(at.loading, at.movement),
+        sd,
+        np.tile(np.arange(at.size), 2),
+    )
+
+
+@cache
+def _scores(count: int, seed: int) -> dict[str, np.ndarray]:
+    """Return scores of each draw by Latin hypercube sampling: evenly, in random order.
+
+    Standard normal, but for `law`, which lies between 0 and 1.
+    """
+    rng, even = np.random.default_rng(seed), (np.arange(count) + 0.5) / count
+    levels = {name: rng.permutation(even) for name in SCORES}
+    return {n: level if n == "law" else ndtri(level) for n, level in levels.items()}
+
+
+def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bend of each draw [N], and the share of the fitted leftover that acts.
+
+    Shapes (draw, row) and (row,). A bend that is drawn from its prior is drawn along
+    the direction of loading, so that mirrored data have the mirrored answer.
+    """
+    below, above = model.bends
+    place = at.deformation
+    if at.quantity == "gear":
+        place = place + float(np.mean(model.draws["deformation_offset"]))
+        # The free shape is known, without force: no bend grows between it and the
+        # nearer end of the tested range.
+        low, high = above.far, above.end
+        known = np.clip(place, min(low, 0.0), max(high, 0.0))
+        place = np.clip(place, low, high) + (place - known)
+    scores = score["bend"][:, None] * at.loading
+    # Inside the range both describe the same residuals, each best near its end.
+    upper = np.clip(above.place(place), 0.0, 1.0)
+    bend = upper * above.draw(place, score["law"], scores)
+    bend += (1.0 - upper) * below.draw(place, score["law"], scores)
+    if model.problem.discrepancy is not None:
+        beyond = np.maximum(above.beyond(place), below.beyond(place))
+        return beyond * bend, 1.0 - beyond
+    return (bend * at.factor if at.quantity == "gear" else bend), np.ones(at.size)
+
+
+def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
+    """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
+
+    They act on a reading outside the tested temperatures, by their priors, unless the
+    model holds them as effects.
+    """
+    case = model.posterior.case
+    warm = case.records.temperature
+    kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
+    # A frame expands by its own length, however short the stroke.
+    stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
+    priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
+    priors |= case.gear.effect_priors
+    held = {effect.name for effect in model.posterior.effects}
+    drifts = {}
+    for name, effect in DRIFTS.items():
+        mean, sd = moments(priors[f"{effect}.slope"])
+        acts = at.quantity == "reading" and effect not in held
+        slope = mean + sd * score[name][:, None] * at.loading
+        drifts[name] = slope * kelvins if acts else np.zeros((model.size, at.size))
+    return drifts
+
+
+def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
+    """Return the variance by the tolerance of each size [N²], (draw, row) each.
+
+    The variance by all sizes together is divided as each alone would make it.
+    """
+    if not at.tolerances:
+        return {}
+    posterior = model.posterior
+    geometry, theory = posterior.case.gear.geometry, posterior.theory
+    centred = force - np.einsum("n,dnr->dr", node_share, force)[:, None]
+    together = np.einsum("n,dnr->dr", node_share, centred**2)
+    alone = {
+        name: np.var(size_nodes(geometry, {name: width}, theory)[0])
+        for name, width in at.tolerances.items()
+    }
+    total = sum(alone.values())
+    return {name: together * part / total for name, part in alone.items()}
+
+
+def widest(problem: Problem) -> Population:
+    """Return the widest population of which the data hold two members or more."""
+    if problem.specimens >= 2:
+        return "specimens"
+    return "mountings" if problem.runs >= 2 else "readings"
+
+
+def population_findings(asked: str | None, problem: Problem) -> list[Finding]:
+    """Return why the data cannot describe a population; empty where they can."""
+    if asked is None or asked == "readings":
+        return []
+    if asked not in POPULATIONS:
+        words = f"'{asked}' is unknown"
+        return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
+    what, count = {
+        "mountings": ("mounting (run)", problem.runs),
+        "specimens": ("gear (specimen)", problem.specimens),
+    }[asked]
+    if count >= 2:
+        return []
+    words = f"the data hold one {what}, which does not show how much others differ"
+    remedy = f"Measure two or more, or ask about {widest(problem)}"
+    return [Finding("population", words, remedy)]
