@@ -114,7 +114,7 @@ def deformation_findings(
         units: of what was measured.
     """
     # Late: it is not needed to fit a fleet.
-    from hdcal.prediction.engine.conditions import far_findings
+    from hdcal.prediction.conditions import far_findings
 
     wrong = implausible("deformation", deformation, units.displacement)
     unit = units.displacement_unit

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.plausible import implausible
@@ -54,16 +55,21 @@ class Conditions:
 
     @classmethod
     def of(
-        cls, deformation, temperature, loading=1.0, unloading=False, **more
+        cls,
+        deformation: ArrayLike,
+        temperature: ArrayLike,
+        loading: ArrayLike = 1.0,
+        unloading: ArrayLike = False,
+        **more: Any,
     ) -> "Conditions":
         """Return conditions of numbers and arrays that broadcast to (n,)."""
-        columns = np.broadcast_arrays(
+        at, warm, sense, back = np.broadcast_arrays(
             np.atleast_1d(np.asarray(deformation, float)),
             np.asarray(temperature, float),
             np.asarray(loading, float),
             np.asarray(unloading, bool),
         )
-        return cls(*columns, **more)
+        return cls(at, warm, sense, back, **more)
 
     @property
     def size(self) -> int:

@@ -156,9 +156,7 @@ def _fitted(end: float, far: float, deformation, residual, weight, change) -> Be
     unusual = np.log(np.maximum(size / (ORDINARY * change), 1.0))
     log_chance = -0.5 * (misfit + within / noise**2 + unusual**2)
     log_chance -= (rows - len(knots)) * np.log(noise)
-    return Bend(
-        end, far, knots, line, axes, found, size, spread, softmax(log_chance)
-    )
+    return Bend(end, far, knots, line, axes, found, size, spread, softmax(log_chance))
 
 
 def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.ndarray:

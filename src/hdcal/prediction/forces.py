@@ -81,9 +81,7 @@ def force_of(
     effects = build_effects(problem, values)
     base = member_base(problem, values)
     offset = base.deformation_offset - moved / problem.reading.radial_per_read
-    base = replace(
-        base, stiffness=base.stiffness * factor, deformation_offset=offset
-    )
+    base = replace(base, stiffness=base.stiffness * factor, deformation_offset=offset)
     if quantity == "reading":
         return predict_reading(base, effects, records, problem.reading)
     base = replace(base, force_offset=jnp.zeros_like(base.force_offset))

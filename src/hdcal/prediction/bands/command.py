@@ -45,8 +45,8 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     could not separate are averaged over by their probability.
     """
     from hdcal.inference.model_average import load_models
-    from hdcal.prediction.models import models_of
     from hdcal.prediction.bands.predict import predict as bands_of
+    from hdcal.prediction.models import models_of
     from hdcal.report.saving import Target
     from hdcal.report.table_files import columns_csv
 

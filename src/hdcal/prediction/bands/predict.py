@@ -40,7 +40,7 @@ from hdcal.prediction.models import (
 )
 from hdcal.prediction.simulate import simulate_all, widest
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import Draws, Interval, Probability, Words, quantity
+from hdcal.report.item import Draws, Interval, Probability, quantity
 from hdcal.report.result import Result
 
 # Rows predicted at a time: with 4000 draws each array of a block takes 32 MB.
@@ -73,7 +73,7 @@ class Bands(Result):
     """
 
     template = "prediction/bands/report.md.j2"
-    table = "columns"
+    table = "values"
 
     format: Literal["hdcal.prediction/1"] = "hdcal.prediction/1"
     deformation_mm: Draws = quantity("deformation", "mm")
@@ -97,10 +97,12 @@ class Bands(Result):
     averaging: tuple[str, ...] = Field(exclude=True)
     tested_range: str = Field(exclude=True)
 
-    @computed_field(json_schema_extra={"additionalProperties": {"type": "array"}})
+    @computed_field(
+        alias="columns", json_schema_extra={"additionalProperties": {"type": "array"}}
+    )
     @property
-    def columns(self) -> dict[str, tuple[Any, ...]]:
-        """Columns of the table by name."""
+    def values(self) -> dict[str, tuple[Any, ...]]:
+        """Columns of the table by name; what was not fitted is null."""
         names = {self.units.key(name): name for name in COLUMNS}
         found = {key: getattr(self, name).tolist() for key, name in names.items()}
         return {
@@ -132,9 +134,7 @@ class Bands(Result):
 
 # Columns of bands.csv, in their order.
 COLUMNS = tuple(
-    name
-    for name, field in Bands.model_fields.items()
-    if field.exclude and field.title
+    name for name, field in Bands.model_fields.items() if field.exclude and field.title
 )
 
 

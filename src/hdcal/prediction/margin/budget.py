@@ -90,8 +90,9 @@ def divided(
         axis = column / size
         along = float(axis @ left)
         if along**2 > _CHANCE**2 * (left @ left) / len(left):
-            row = (centred @ centred, centred @ left, along**2)
-            parts[name] = tuple(float(part) / len(left) for part in row)
+            count = len(left)
+            tied = float(centred @ left) / count
+            parts[name] = float(np.var(values)), tied, along**2 / count
             basis, left = np.column_stack([basis, axis]), left - axis * along
     variance = float(np.var(left))
     return parts | {rest: (variance, variance, variance)}
@@ -133,7 +134,9 @@ def budget(
     small = [n for n, row in found.items() if not row[2] > _LEAST_SHARE * total]
     for name in small:
         found["calibration"] = found["calibration"] + found.pop(name)[2]
-    listed = [_row(n, row, total, models[0], direction, units) for n, row in found.items()]
+    listed = [
+        _row(n, row, total, models[0], direction, units) for n, row in found.items()
+    ]
     ranked = sorted(listed, key=lambda row: -row.share)
     return tuple(ranked), direction * estimate, total**0.5
 

@@ -47,7 +47,11 @@ def force_chart(found: "Margin") -> Chart:
             y=load_axis(found.units),
             marks=marks,
             title=title,
-            names=[f"{_bounds(found)} bounds", f"one {found.member}, 95 %", "mean, 95 %"],
+            names=[
+                f"{_bounds(found)} bounds",
+                f"one {found.member}, 95 %",
+                "mean, 95 %",
+            ],
             horizontal=True,
         )
     return Chart(panels=[panel])
@@ -85,7 +89,10 @@ def _over_temperature(found: "Margin") -> Iterator[Mark]:
                 opacity=0.0,
                 hatched=True,
             )
-    for end, label in (("lower_bound_N", f"{_bounds(found)} bounds"), ("upper_bound_N", "")):
+    for end, label in (
+        ("lower_bound_N", f"{_bounds(found)} bounds"),
+        ("upper_bound_N", ""),
+    ):
         y = np.array([getattr(level, end) for level in levels])
         yield Line(label=label, x=x, y=y, colour="", width=1.2)
 
@@ -101,9 +108,7 @@ def budget_chart(found: "Margin") -> Chart:
         places = np.array([i for i, row in enumerate(rows) if row.type_ == kind])
         if places.size:
             shares = np.array([100.0 * rows[i].share for i in places])
-            marks.append(
-                Bars(label=words, at=1.0 + places, high=shares, colour=colour)
-            )
+            marks.append(Bars(label=words, at=1.0 + places, high=shares, colour=colour))
     panel = Panel(
         x="",
         y="share of the variance [%]",

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.data.theory_names import SPRING
-from hdcal.inference.residuals import residuals
 from hdcal.inference.checks import correlation_check
+from hdcal.inference.residuals import residuals
 from hdcal.prediction.conditions import (
     SENSE,
     Conditions,
@@ -25,13 +25,13 @@ from hdcal.prediction.conditions import (
 from hdcal.prediction.forces import Quantity
 from hdcal.prediction.margin.budget import budget
 from hdcal.prediction.margin.decision import decide
+from hdcal.prediction.margin.reached import deformation_reached
 from hdcal.prediction.margin.request import (
     Request,
     Rule,
     require_answerable,
     require_numbers,
 )
-from hdcal.prediction.margin.reached import deformation_reached
 from hdcal.prediction.margin.result import (
     Calibrated,
     Exceedance,
@@ -148,7 +148,9 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
     sign, posterior = asked.direction_of_loading, found[0].posterior
     row = int(np.argmax([_outer(level, sign) for level in levels]))
     worst, here = levels[row], [part.row(row) for part in parts]
-    rows, estimate, sd = budget(found, here, step / 12.0**0.5, sign, posterior.case.units)
+    rows, estimate, sd = budget(
+        found, here, step / 12.0**0.5, sign, posterior.case.units
+    )
     expanded = 0.5 * (worst.member_N.hi - worst.member_N.lo)
     bend = np.concatenate([sign * part.common["leftover"][:, 0] for part in here])
     weight = np.concatenate([part.weight for part in here])
@@ -299,7 +301,8 @@ def _each_model(
         shares = ((1.0 - asked.content, 1.0 - asked.confidence, -0.5),)
         shares += ((asked.content, asked.confidence, 0.5),)
         ends = sorted(
-            sign * (float(over_draws(part.quantile(p), part.weight, [g])[0, 0]) + s * step)
+            sign
+            * (float(over_draws(part.quantile(p), part.weight, [g])[0, 0]) + s * step)
             for p, g, s in shares
         )
         bounds.append(

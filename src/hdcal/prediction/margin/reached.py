@@ -40,7 +40,9 @@ def deformation_reached(
         return None
     sign = 1 if force > 0.0 else -1
     records = found[0].posterior.case.records
-    tested = np.sort(sign * np.array([records.deformation.min(), records.deformation.max()]))
+    tested = np.sort(
+        sign * np.array([records.deformation.min(), records.deformation.max()])
+    )
     places = np.linspace(min(0.0, tested[0]), max(0.0, _REACH * tested[1]), _PLACES)
     there = replace(
         at,
@@ -49,7 +51,9 @@ def deformation_reached(
         loading=np.full(_PLACES, float(sign)),
         unloading=np.full(_PLACES, asked.direction == "down"),
     )
-    members = simulate_all(found, there, asked.population, seed=asked.seed).thinned(_DRAWS)
+    members = simulate_all(found, there, asked.population, seed=asked.seed).thinned(
+        _DRAWS
+    )
     step = float(found[0].problem.step) if asked.quantity == "reading" else 0.0
     half, size, sure = 0.5 * step, abs(force), asked.confidence
 
@@ -71,19 +75,19 @@ def deformation_reached(
     return Reached(
         force_N=force,
         temperature_C=warm,
-        searched_mm=tuple(sorted((sign * float(places[0]), sign * float(places[-1])))),
+        searched_mm=(min(sign * places[[0, -1]]), max(sign * places[[0, -1]])),
         median_mm=middle[1],
         lo_mm=middle[0],
         hi_mm=middle[2],
         lower_bound_mm=ends[0],
         upper_bound_mm=ends[1],
-        tested=all(x is not None and inside[0] <= sign * x <= inside[1] for x in numbers),
+        tested=all(
+            x is not None and inside[0] <= sign * x <= inside[1] for x in numbers
+        ),
     )
 
 
-def first_crossing(
-    curve: np.ndarray, needed: float, places: np.ndarray
-) -> np.ndarray:
+def first_crossing(curve: np.ndarray, needed: float, places: np.ndarray) -> np.ndarray:
     """Return where each curve first reaches a value, by linear interpolation.
 
     Args:

@@ -151,7 +151,10 @@ def _forces(
 ) -> Iterator[Finding]:
     at, unit = asked.deformation, units.load_unit
     usual = abs(float(np.median(main.draws["stiffness"])) * at)
-    for name, force in (("limit_force", limit_force), ("given_force", asked.given_force)):
+    for name, force in (
+        ("limit_force", limit_force),
+        ("given_force", asked.given_force),
+    ):
         if force is None:
             continue
         if wrong := implausible(name, force):

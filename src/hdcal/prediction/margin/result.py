@@ -14,7 +14,8 @@ from hdcal.prediction.margin.charts import budget_chart, force_chart
 from hdcal.prediction.margin.decision import Decision
 from hdcal.prediction.simulate import Population
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import Count, Interval, Item, Probability, Words, quantity
+from hdcal.report.item import Count, Interval, Item, Probability, Words
+from hdcal.report.item import quantity as labelled
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.result import Result
 
@@ -39,13 +40,13 @@ class Exceedance(Item):
         beta: reliability index −Φ⁻¹(P); a lower limit where P is an upper one.
     """
 
-    probability: Probability = quantity("probability that a member exceeds the limit")
-    error: float = quantity("Monte Carlo standard error of the probability")
-    resolved: bool = quantity("whether the draws resolve the probability")
-    lo: Probability = quantity("share of members above the limit, lower end")
-    hi: Probability = quantity("share of members above the limit, upper end")
-    at_confidence: Probability = quantity("share of members above, confidence bound")
-    beta: float = quantity("reliability index")
+    probability: Probability = labelled("probability that a member exceeds the limit")
+    error: float = labelled("Monte Carlo standard error of the probability")
+    resolved: bool = labelled("whether the draws resolve the probability")
+    lo: Probability = labelled("share of members above the limit, lower end")
+    hi: Probability = labelled("share of members above the limit, upper end")
+    at_confidence: Probability = labelled("share of members above, confidence bound")
+    beta: float = labelled("reliability index")
 
 
 class Level(Item):
@@ -62,15 +63,15 @@ class Level(Item):
         capacity_median_N: the same with a confidence of a half.
     """
 
-    temperature_C: float = quantity("temperature", "°C")
-    tested: bool = quantity("tested")
-    force_N: Interval = quantity("mean", "N")
-    member_N: Interval = quantity("one member", "N")
-    lower_bound_N: float = quantity("lower bound", "N")
-    upper_bound_N: float = quantity("upper bound", "N")
-    capacity_N: float = quantity("required capacity", "N")
-    capacity_median_N: float = quantity("required capacity, 50 % confidence", "N")
-    exceedance: Exceedance | None = quantity("limit exceeded")
+    temperature_C: float = labelled("temperature", "°C")
+    tested: bool = labelled("tested")
+    force_N: Interval = labelled("mean", "N")
+    member_N: Interval = labelled("one member", "N")
+    lower_bound_N: float = labelled("lower bound", "N")
+    upper_bound_N: float = labelled("upper bound", "N")
+    capacity_N: float = labelled("required capacity", "N")
+    capacity_median_N: float = labelled("required capacity, 50 % confidence", "N")
+    exceedance: Exceedance | None = labelled("limit exceeded")
 
 
 class Reached(Item):
@@ -84,24 +85,24 @@ class Reached(Item):
         tested: whether the data hold the whole of it.
     """
 
-    force_N: float = quantity("given force", "N")
-    temperature_C: float = quantity("temperature", "°C")
+    force_N: float = labelled("given force", "N")
+    temperature_C: float = labelled("temperature", "°C")
     searched_mm: tuple[float, float]
-    median_mm: float | None = quantity("deformation reached", "mm")
-    lo_mm: float | None = quantity("lower end", "mm")
-    hi_mm: float | None = quantity("upper end", "mm")
-    lower_bound_mm: float | None = quantity("lower bound", "mm")
-    upper_bound_mm: float | None = quantity("upper bound", "mm")
+    median_mm: float | None = labelled("deformation reached", "mm")
+    lo_mm: float | None = labelled("lower end", "mm")
+    hi_mm: float | None = labelled("upper end", "mm")
+    lower_bound_mm: float | None = labelled("lower bound", "mm")
+    upper_bound_mm: float | None = labelled("upper bound", "mm")
     tested: bool
 
 
 class ModelBound(Item):
     """Bounds of one of several models alone, at the worst temperature."""
 
-    model: Words = quantity("model")
-    probability: Probability = quantity("probability")
-    lower_bound_N: float = quantity("lower bound", "N")
-    upper_bound_N: float = quantity("upper bound", "N")
+    model: Words = labelled("model")
+    probability: Probability = labelled("probability")
+    lower_bound_N: float = labelled("lower bound", "N")
+    upper_bound_N: float = labelled("upper bound", "N")
 
 
 class Calibrated(Item):
@@ -154,7 +155,7 @@ class Margin(Result):
     table = "levels"
 
     format: Literal["hdcal.margin/3"] = "hdcal.margin/3"
-    deformation_mm: float = quantity("deformation", "mm")
+    deformation_mm: float = labelled("deformation", "mm")
     direction: Direction
     loading_sense: Literal[1, -1]
     quantity: Quantity
@@ -162,14 +163,14 @@ class Margin(Result):
     content: Share
     confidence: Share
     required_probability: Share
-    limit_force_N: float | None = quantity("limit", "N")
+    limit_force_N: float | None = labelled("limit", "N")
     tolerances_mm: dict[str, float]
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
     worst: Level
-    estimate_N: float = quantity("estimate of one member", "N")
-    combined_standard_uncertainty_N: float = quantity("standard uncertainty", "N")
-    coverage_factor: float = quantity("coverage factor")
-    expanded_uncertainty_N: float = quantity("expanded uncertainty", "N")
+    estimate_N: float = labelled("estimate of one member", "N")
+    combined_standard_uncertainty_N: float = labelled("standard uncertainty", "N")
+    coverage_factor: float = labelled("coverage factor")
+    expanded_uncertainty_N: float = labelled("expanded uncertainty", "N")
     budget: tuple[BudgetRow, ...]
     decision: Decision | None
     reached: Reached | None
