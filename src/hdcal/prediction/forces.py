@@ -120,8 +120,9 @@ def forces_of_draws(
 
     Returns:
         Force (draw, node, asked) [N], its derivative by the factor [N], logarithms of
-        the shares of the components of the noise (draw, node, component), and their
-        sds (draw, node, component, asked) [N].
+        the shares of the components of the noise (draw, node, component), their sds
+        (draw, node, component, asked) [N], and the leftover discrepancy in the force
+        (draw, asked) [N].
     """
 
     def of_draw(value, factor, moved):
@@ -139,7 +140,7 @@ def forces_of_draws(
             mean, slope, noise = jax.jvp(force, (factor,), (one,), has_aux=True)
             return mean, slope, *noise
 
-        return jax.vmap(with_slope)(factor)
+        return *jax.vmap(with_slope)(factor), left
 
     return jax.vmap(of_draw)(draws, factor, moved)
 

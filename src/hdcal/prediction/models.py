@@ -168,3 +168,19 @@ def averaging_words(models: Models) -> list[str]:
             f"{hypothesis(missing.counted_as)}."
         )
     return words
+
+
+def joint_draws(models: Sequence[Model], site: str, most: int = 4000) -> np.ndarray:
+    """Return draws of a parameter over all models, each as often as it is probable.
+
+    Args:
+        models: with their probabilities.
+        site: of every model.
+        most: number of draws.
+    """
+    parts = []
+    for model in models:
+        count = round(most * model.probability) + 1
+        rows = np.linspace(0, model.size - 1, count).round().astype(int)
+        parts.append(model.draws[site][rows])
+    return np.concatenate(parts)

@@ -33,7 +33,8 @@ SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
 DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}
 # Certified errors of gauges: inputs of their own, where a load is asked for.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
-# Parameters that are inputs of their own where the prior determines them.
+# Parameters that are inputs of their own where the prior determines them; the zero of
+# the gauge is one of every load.
 SEPARATE = ("alpha", "force_offset")
 
 
@@ -64,12 +65,12 @@ def simulate(
     gear = gear_sd * score["gear"] / max(gears, 1) ** 0.5
     mounting = zero_sd * score["mounting"] / max(mountings, 1) ** 0.5
     drift = _drifts(model, at, score)
-    bend, leftover = _bend(model, at, score)
+    bend, acting = _bend(model, at, score)
     theory, tested = model.posterior.theory, model.posterior.case.gear.geometry
     nodes, node_share = size_nodes(tested, at.tolerances, theory)
     path = _path(at, model.posterior.case.records)
     repeats = len(path.deformation) // at.size
-    force, slope, log_share, noise = (
+    force, slope, log_share, noise, left = (
         np.asarray(found)
         for found in forces_of_draws(
             problem,
@@ -77,7 +78,7 @@ def simulate(
             path,
             ((1.0 + gear)[:, None] * nodes)[:, :, None] * at.factor,
             np.tile(drift["frame_drift"], repeats),
-            leftover,
+            acting,
             quantity=at.quantity,
             asked=at.size,
         )
@@ -94,16 +95,18 @@ def simulate(
     scatter = {"noise": within, "gear": np.einsum("n,dnr->dr", node_share, own)}
     scatter["mounting"] = np.broadcast_to(zero_sd[:, None] ** 2, within.shape)
     scatter |= _of_sizes(model, at, along, node_share)
+    # A load is what is left of a reading once the zero of the gauge is taken off.
+    separate = "force_offset" if at.quantity == "load" else ""
     common = {"gear": gear, "mounting": mounting} | {
         name: draws[name]
         for name in (*CERTIFIED, *SEPARATE)
-        if name in draws and model.driver(name) == "prior"
+        if name in draws and (model.driver(name) == "prior" or name == separate)
     }
     common = {
         name: np.broadcast_to(values[:, None], within.shape)
         for name, values in common.items()
     }
-    common |= {"leftover": at.loading * bend, **drift}
+    common |= {"bend": at.loading * bend, "leftover": at.loading * left, **drift}
     return Members(
         model.weights,
         share.reshape(count, -1),

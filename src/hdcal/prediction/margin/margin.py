@@ -152,7 +152,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
         found, here, step / 12.0**0.5, sign, posterior.case.units
     )
     expanded = 0.5 * (worst.member_N.hi - worst.member_N.lo)
-    bend = np.concatenate([sign * part.common["leftover"][:, 0] for part in here])
+    bend = np.concatenate([sign * part.common["bend"][:, 0] for part in here])
     weight = np.concatenate([part.weight for part in here])
     mean = float(weight @ bend)
     return Margin(
