@@ -30,7 +30,7 @@ KINDS = ("readings", "mountings", "specimens")
 # Sds of the members: zeros of mountings [N], stiffness of gears relative.
 ZERO_SD, GEAR_SD = 0.8, 0.03
 # Enough draws for an interval of 95 %.
-SAMPLED = {"chains": 2, "warmup": 500, "draws": 500}
+SAMPLED = {"chains": 2, "warmup": 500, "draws": 1500}
 # Of one size, as every other one is compiled anew.
 MEMBERS, ROWS = 5, 12
 CONTENT, CONFIDENCE = 0.9, 0.95
