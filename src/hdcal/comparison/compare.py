@@ -1,6 +1,6 @@
 """Comparison of the stiffness of several results."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -10,8 +10,7 @@ from hdcal.comparison.charts import stiffness_chart
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.prediction.engine.causes import Cause, causes_of
-from hdcal.prediction.engine.models import Models
+from hdcal.prediction.models import Models, joint_draws, models_of
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Count, Draws, Interval, Item, Probability, Words, quantity
 from hdcal.report.result import Result
@@ -93,15 +92,16 @@ def compare(
         if len(results) < 2:
             words, remedy = "two or more are compared", "Give another result"
             wrong.append(Finding("results", words, remedy))
-        models = {name: causes_of(one) for name, one in results.items()}
-    cases = {name: causes[0].posterior.case for name, causes in models.items()}
+        models = {name: models_of(one) for name, one in results.items()}
+    cases = {name: each[0].posterior.case for name, each in models.items()}
     kinds = {n: (c.units.displacement, c.gear.reading) for n, c in cases.items()}
     if len(set(kinds.values())) > 1:
         listed = ", ".join(f"{name} is {kind}" for name, (_, kind) in kinds.items())
         words = f"are stiffnesses over different readings: {listed}"
         raise InputError([Finding("results", words, "Give results of one kind")])
     rng = np.random.default_rng(0)
-    stiffness = np.stack([_draws(causes, rng) for causes in models.values()])
+    drawn = [joint_draws(each, "stiffness", _DRAWS) for each in models.values()]
+    stiffness = np.stack([rng.permutation(draws) for draws in drawn])
     rows = zip(models.items(), stiffness, strict=True)
     return Comparison(
         results=tuple(_compared(*row, stiffness[0], tolerance) for row in rows),
@@ -111,18 +111,10 @@ def compare(
     )
 
 
-def _draws(causes: Sequence[Cause], rng: np.random.Generator) -> np.ndarray:
-    """Return draws of the stiffness over all models, in any order [N/mm as read]."""
-    values = np.concatenate([cause.values["stiffness"] for cause in causes])
-    ends = np.cumsum(np.concatenate([cause.weights for cause in causes]))
-    rows = np.searchsorted(ends / ends[-1], (np.arange(_DRAWS) + 0.5) / _DRAWS)
-    return rng.permutation(values[rows])
-
-
 def _compared(named, draws, first, tolerance: float | None) -> Compared:
-    (name, causes), apart = named, draws - first
-    effects = {label(e.name) for one in causes for e in one.posterior.effects}
-    case = causes[0].posterior.case
+    (name, models), apart = named, draws - first
+    effects = {label(e.name) for one in models for e in one.posterior.effects}
+    case = models[0].posterior.case
     beyond = None if tolerance is None else float(np.mean(np.abs(apart) > tolerance))
     return Compared(
         name=name,

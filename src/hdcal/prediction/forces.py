@@ -99,7 +99,7 @@ def forces_of_draws(
     problem: Problem,
     draws: Values,
     path: Records,
-    factor: Float[Array, "draw node 1"],
+    factor: Float[Array, "draw node n"],
     moved: Float[Array, "draw n"],
     leftover: Float[Array, " asked"],
     *,
@@ -112,7 +112,7 @@ def forces_of_draws(
         problem: structure.
         draws: parameters by site: [draw, …].
         path: rows that lead to the conditions; the last ones are the conditions.
-        factor: on the stiffness [-].
+        factor: on the stiffness at each row of the path [-].
         moved: radial deformation that the frame gains at each row of the path [mm].
         leftover: share of the fitted leftover discrepancy that acts.
         quantity: which force.
@@ -132,7 +132,8 @@ def forces_of_draws(
             mean, noise = force_of(
                 problem, value, path, factor=factor, moved=moved, quantity=quantity
             )
-            total = mean[-asked:] + (left * factor if quantity == "gear" else left)
+            scale = factor[-asked:] if quantity == "gear" else 1.0
+            total = mean[-asked:] + scale * left
             return total, (noise.log_weight, noise.sd[:, -asked:])
 
         def with_slope(factor):

@@ -68,24 +68,13 @@ def simulate(
     bend, acting = _bend(model, at, score)
     theory, tested = model.posterior.theory, model.posterior.case.gear.geometry
     nodes, node_share = size_nodes(tested, at.tolerances, theory)
-    path = _path(at, model.posterior.case.records)
-    repeats = len(path.deformation) // at.size
-    force, slope, log_share, noise, left = (
-        np.asarray(found)
-        for found in forces_of_draws(
-            problem,
-            draws,
-            path,
-            ((1.0 + gear)[:, None] * nodes)[:, :, None] * at.factor,
-            np.tile(drift["frame_drift"], repeats),
-            acting,
-            quantity=at.quantity,
-            asked=at.size,
-        )
+    factor = np.broadcast_to(at.factor, (count, at.size))[:, None]
+    force, slope, log_share, noise, left = _forces(
+        model, at, (1.0 + gear)[:, None, None] * nodes[:, None] * factor, drift, acting
     )
     along = at.loading * (force + (bend + drift["zero_drift"])[:, None])
     along = along + mounting[:, None, None]
-    own = (slope * at.factor * nodes[:, None] * gear_sd[:, None, None]) ** 2
+    own = (slope * factor * nodes[:, None] * gear_sd[:, None, None]) ** 2
     noise = noise**2 if reading else np.zeros_like(noise[:, :, :1])
     share = node_share[:, None] * (np.exp(log_share) if reading else 1.0)
     share = np.broadcast_to(share, noise.shape[:3])
@@ -117,6 +106,19 @@ def simulate(
     )
 
 
+def gear_forces(model: Model, at: Conditions, *, seed: int = 0) -> np.ndarray:
+    """Return the force of every draw on gears by themselves [N], (draw, row).
+
+    Each row is another gear, loaded from its free shape, without zeros, errors and
+    drifts of a rig. `at` has the quantity `gear`, and a factor on the stiffness where
+    sizes or modulus are not the tested ones, (row,) or (draw, row).
+    """
+    bend, acting = _bend(model, at, _scores(model.size, seed))
+    factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
+    none = {"frame_drift": np.zeros((model.size, at.size))}
+    return _forces(model, at, factor, none, acting)[0][:, 0] + bend
+
+
 def simulate_all(
     models: Sequence[Model],
     at: Conditions,
@@ -129,6 +131,23 @@ def simulate_all(
     Each draw has the weight of its model; sources of scatter are left out.
     """
     return joined([simulate(model, at, population, seed=seed) for model in models])
+
+
+def _forces(model: Model, at: Conditions, factor, drift, acting) -> tuple:
+    """Return what `forces_of_draws` does."""
+    path = _path(at, model.posterior.case.records)
+    repeats = len(path.deformation) // at.size
+    found = forces_of_draws(
+        model.problem,
+        model.draws,
+        path,
+        np.tile(factor, repeats),
+        np.tile(drift["frame_drift"], repeats),
+        acting,
+        quantity=at.quantity,
+        asked=at.size,
+    )
+    return tuple(map(np.asarray, found))
 
 
 def _path(at: Conditions, records: Records) -> Records:
@@ -166,24 +185,20 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
     Shapes (draw, row) and (row,). A bend that is drawn from its prior is drawn along
     the direction of loading, so that mirrored data have the mirrored answer.
     """
-    below, above = model.bends
     place = at.deformation
     if at.quantity == "gear":
         place = place + float(np.mean(model.draws["deformation_offset"]))
         # The free shape is known, without force: no bend grows between it and the
         # nearer end of the tested range.
+        _, above = model.bends
         low, high = above.far, above.end
         known = np.clip(place, min(low, 0.0), max(high, 0.0))
         place = np.clip(place, low, high) + (place - known)
-    scores = score["bend"][:, None] * at.loading
-    # Inside the range both describe the same residuals, each best near its end.
-    upper = np.clip(above.place(place), 0.0, 1.0)
-    bend = upper * above.draw(place, score["law"], scores)
-    bend += (1.0 - upper) * below.draw(place, score["law"], scores)
-    if model.problem.discrepancy is not None:
-        beyond = np.maximum(above.beyond(place), below.beyond(place))
-        return beyond * bend, 1.0 - beyond
-    return (bend * at.factor if at.quantity == "gear" else bend), np.ones(at.size)
+    mean, sd = model.bend(place, score["law"])
+    bend = mean + sd * score["bend"][:, None] * at.loading
+    if at.quantity == "gear":
+        bend = bend * at.factor
+    return bend, 1.0 - model.beyond(place)
 
 
 def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
@@ -199,7 +214,7 @@ def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
     stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
     priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
     priors |= case.gear.effect_priors
-    held = {effect.name for effect in model.posterior.effects}
+    held = {effect.name for effect in model.effects}
     drifts = {}
     for name, effect in DRIFTS.items():
         mean, sd = moments(priors[f"{effect}.slope"])

@@ -27,13 +27,13 @@ from hdcal.prediction.margin.budget import budget
 from hdcal.prediction.margin.decision import decide
 from hdcal.prediction.margin.reached import deformation_reached
 from hdcal.prediction.margin.request import (
-    Request,
+    MarginRequest,
     Rule,
     require_answerable,
     require_numbers,
 )
 from hdcal.prediction.margin.result import (
-    Calibrated,
+    CalibrationSource,
     Exceedance,
     Level,
     Margin,
@@ -113,7 +113,7 @@ def margin(
     found = models_of(models)
     case = found[0].posterior.case
     warm = usual_temperature(case) if temperature is None else temperature
-    asked = Request(
+    asked = MarginRequest(
         deformation=deformation,
         temperature=np.atleast_1d(np.asarray(warm, float)),
         direction_of_loading=direction_of_loading(found, deformation),
@@ -133,7 +133,7 @@ def margin(
     return _answered(found, asked, models)
 
 
-def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margin:
+def _answered(found: tuple[Model, ...], asked: MarginRequest, models: Models) -> Margin:
     at = Conditions.of(
         asked.deformation,
         asked.temperature,
@@ -175,7 +175,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
         budget=rows,
         decision=_decision(asked, worst, estimate, step),
         reached=deformation_reached(found, asked, at, worst.temperature_C),
-        models=_each_model(found, here, asked, step) if len(found) > 1 else (),
+        models=_each_model(found, here, asked, step),
         causes=probabilities(found),
         weight_left_out=left_out_of(models),
         beyond_tested=beyond_tested(asked.deformation, posterior.case.records),
@@ -194,7 +194,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
 
 
 def _levels(
-    found: Sequence[Model], asked: Request, members: Members, step: float
+    found: Sequence[Model], asked: MarginRequest, members: Members, step: float
 ) -> tuple[Level, ...]:
     """Return the force at each temperature.
 
@@ -283,7 +283,7 @@ def _exceedance(
     )
 
 
-def _decision(asked: Request, worst: Level, estimate: float, step: float):
+def _decision(asked: MarginRequest, worst: Level, estimate: float, step: float):
     if asked.limit_force is None or worst.exceedance is None:
         return None
     sign, span = asked.direction_of_loading, worst.member_N
@@ -294,9 +294,12 @@ def _decision(asked: Request, worst: Level, estimate: float, step: float):
 
 
 def _each_model(
-    found: Sequence[Model], parts: Sequence[Members], asked: Request, step: float
+    found: Sequence[Model], parts: Sequence[Members], asked: MarginRequest, step: float
 ) -> tuple[ModelBound, ...]:
+    """Return the bounds of each of several models; of one none."""
     sign, bounds = asked.direction_of_loading, []
+    if len(found) == 1:
+        return ()
     for model, part in zip(found, parts, strict=True):
         shares = ((1.0 - asked.content, 1.0 - asked.confidence, -0.5),)
         shares += ((asked.content, asked.confidence, 0.5),)
@@ -316,9 +319,9 @@ def _each_model(
     return tuple(bounds)
 
 
-def _data(model: Model) -> Calibrated:
+def _data(model: Model) -> CalibrationSource:
     case = model.posterior.case
-    return Calibrated(
+    return CalibrationSource(
         gear=case.gear.name,
         theory=model.posterior.theory,
         name=case.name,
