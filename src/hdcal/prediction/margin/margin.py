@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.data.theory_names import SPRING
-from hdcal.inference.checks import correlation_check
-from hdcal.inference.residuals import residuals
+from hdcal.inference.residuals import noise_warnings
 from hdcal.prediction.conditions import (
     SENSE,
     Conditions,
@@ -186,7 +185,7 @@ def _answered(found: tuple[Model, ...], asked: MarginRequest, models: Models) ->
         posterior=posterior,
         bend_N=(mean, float(weight @ (bend - mean) ** 2) ** 0.5),
         averaging=tuple(averaging_words(models)),
-        warnings=_warnings(found),
+        warnings=noise_warnings(posterior),
         turn_mm=float(at.turn(posterior.case.records)[0]),
         part="part" if posterior.theory == SPRING else "gear",
         units=posterior.case.units,
@@ -328,14 +327,3 @@ def _data(model: Model) -> CalibrationSource:
         rows=len(case.records.force),
         sha256=case.data_sha256,
     )
-
-
-def _warnings(found: Sequence[Model]) -> tuple[str, ...]:
-    """Return warnings on the noise of the most probable model."""
-    posterior = found[0].posterior
-    words = [fault.words for fault in residuals(posterior).noise]
-    rows = len(posterior.case.records.force)
-    alike = correlation_check(posterior.draws, rows)
-    if alike.outcome == "warning":
-        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
-    return tuple(words)
