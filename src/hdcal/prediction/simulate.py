@@ -18,6 +18,7 @@ from hdcal.data.records import Records
 from hdcal.errors import Finding
 from hdcal.inference.distributions import moments
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
 from hdcal.prediction.conditions import Conditions, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
 from hdcal.prediction.members import Members, joined
@@ -70,7 +71,11 @@ def simulate(
     nodes, node_share = size_nodes(tested, at.tolerances, theory)
     factor = np.broadcast_to(at.factor, (count, at.size))[:, None]
     force, slope, log_share, noise, left = _forces(
-        model, at, (1.0 + gear)[:, None, None] * nodes[:, None] * factor, drift, acting
+        model,
+        at,
+        (1.0 + gear)[:, None, None] * nodes[:, None] * factor,
+        drift["frame_drift"],
+        acting,
     )
     along = at.loading * (force + (bend + drift["zero_drift"])[:, None])
     along = along + mounting[:, None, None]
@@ -106,17 +111,49 @@ def simulate(
     )
 
 
-def gear_forces(model: Model, at: Conditions, *, seed: int = 0) -> np.ndarray:
+def gear_forces(
+    model: Model, at: Conditions, draws: Values | None = None, *, seed: int = 0
+) -> np.ndarray:
     """Return the force of every draw on gears by themselves [N], (draw, row).
 
     Each row is another gear, loaded from its free shape, without zeros, errors and
-    drifts of a rig. `at` has the quantity `gear`, and a factor on the stiffness where
-    sizes or modulus are not the tested ones, (row,) or (draw, row).
+    drifts of a rig.
+
+    Args:
+        model: whose posterior is simulated.
+        at: with the quantity `gear`, and a factor on the stiffness where sizes or
+            modulus are not the tested ones, (row,) or (draw, row).
+        draws: other values of the parameters, such as those of another material.
+        seed: of the scores of what the draws leave open.
     """
     bend, acting = _bend(model, at, _scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
-    none = {"frame_drift": np.zeros((model.size, at.size))}
-    return _forces(model, at, factor, none, acting)[0][:, 0] + bend
+    moved = np.zeros((model.size, at.size))
+    return _forces(model, at, factor, moved, acting, draws)[0][:, 0] + bend
+
+
+def gear_leftover(
+    model: Model, deformation: np.ndarray, *, seed: int = 0
+) -> np.ndarray:
+    """Return what a gear by itself has beside model and effects [N], (draw, row).
+
+    The bend, and the fitted leftover as the mean of loading and unloading.
+
+    Args:
+        model: whose posterior is simulated.
+        deformation: from the free shape, per mm as read, (row,).
+        seed: of the scores of what the draws leave open.
+    """
+    score, sign = _scores(model.size, seed), np.where(deformation < 0.0, -1.0, 1.0)
+    warm = model.posterior.case.gear.reference_temperature
+    ways = [
+        Conditions.of(deformation, warm, sign, unloading, quantity="gear")
+        for unloading in (False, True)
+    ]
+    bend, acting = _bend(model, ways[0], score)
+    one = np.ones((model.size, 1, len(deformation)))
+    moved = np.zeros((model.size, len(deformation)))
+    return bend + np.mean([_forces(model, at, one, moved, acting)[4] for at in ways], 0)
 
 
 def simulate_all(
@@ -133,16 +170,18 @@ def simulate_all(
     return joined([simulate(model, at, population, seed=seed) for model in models])
 
 
-def _forces(model: Model, at: Conditions, factor, drift, acting) -> tuple:
+def _forces(
+    model: Model, at: Conditions, factor, moved, acting, draws: Values | None = None
+) -> tuple[np.ndarray, ...]:
     """Return what `forces_of_draws` does."""
     path = _path(at, model.posterior.case.records)
     repeats = len(path.deformation) // at.size
     found = forces_of_draws(
         model.problem,
-        model.draws,
+        model.draws if draws is None else draws,
         path,
         np.tile(factor, repeats),
-        np.tile(drift["frame_drift"], repeats),
+        np.tile(moved, repeats),
         acting,
         quantity=at.quantity,
         asked=at.size,
