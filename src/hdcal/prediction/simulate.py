@@ -7,7 +7,6 @@ responses and tracking.
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Literal, get_args
 
 import numpy as np
 from scipy.special import ndtri
@@ -15,18 +14,15 @@ from scipy.special import ndtri
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
-from hdcal.errors import Finding
 from hdcal.inference.distributions import moments
-from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.conditions import Conditions, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
 from hdcal.prediction.members import Members, joined
 from hdcal.prediction.models import Model
+from hdcal.prediction.population import Population
 from hdcal.prediction.sizes import size_nodes
 
-Population = Literal["readings", "mountings", "specimens"]
-POPULATIONS: tuple[Population, ...] = get_args(Population)
 # What the draws leave open about all members: standard normal scores of each draw, and
 # `law`, the level at which a law of the bend is selected.
 SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
@@ -280,28 +276,3 @@ def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
     }
     total = sum(alone.values())
     return {name: together * part / total for name, part in alone.items()}
-
-
-def widest(problem: Problem) -> Population:
-    """Return the widest population of which the data hold two members or more."""
-    if problem.specimens >= 2:
-        return "specimens"
-    return "mountings" if problem.runs >= 2 else "readings"
-
-
-def population_findings(asked: str | None, problem: Problem) -> list[Finding]:
-    """Return why the data cannot describe a population; empty where they can."""
-    if asked is None or asked == "readings":
-        return []
-    if asked not in POPULATIONS:
-        words = f"'{asked}' is unknown"
-        return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
-    what, count = {
-        "mountings": ("mounting (run)", problem.runs),
-        "specimens": ("gear (specimen)", problem.specimens),
-    }[asked]
-    if count >= 2:
-        return []
-    words = f"the data hold one {what}, which does not show how much others differ"
-    remedy = f"Measure two or more, or ask about {widest(problem)}"
-    return [Finding("population", words, remedy)]

@@ -38,7 +38,8 @@ from hdcal.prediction.models import (
     models_of,
     probabilities,
 )
-from hdcal.prediction.simulate import simulate_all, widest
+from hdcal.prediction.population import widest
+from hdcal.prediction.simulate import simulate_all
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Draws, Interval, Probability, quantity
 from hdcal.report.result import Result

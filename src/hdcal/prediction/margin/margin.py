@@ -47,8 +47,9 @@ from hdcal.prediction.models import (
     models_of,
     probabilities,
 )
+from hdcal.prediction.population import Population, widest
 from hdcal.prediction.shares import RAREST
-from hdcal.prediction.simulate import Population, simulate, widest
+from hdcal.prediction.simulate import simulate
 from hdcal.prediction.sizes import SIZES
 from hdcal.report.item import INTERVAL, Interval
 from hdcal.versions import versions

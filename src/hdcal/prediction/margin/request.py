@@ -22,8 +22,8 @@ from hdcal.prediction.conditions import (
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
 from hdcal.prediction.models import Model
+from hdcal.prediction.population import Population, population_findings
 from hdcal.prediction.shares import share_findings
-from hdcal.prediction.simulate import Population, population_findings
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.quantities import Quantities
 
