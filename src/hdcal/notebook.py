@@ -9,26 +9,23 @@ from typing import Any
 
 # Class -> what makes a `report.result.Result` of it.
 RESULTS = {
+    "DynamicPosterior": "motion.dynamic_result.dynamic_calibration_of",
     "Posterior": "calibration.calibration.calibration_of",
     "Residuals": "calibration.residual_report.residual_report",
 }
 # Class of another result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
-    "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
-    "Response": "motion.respond.summary.response_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
     "Bands": "report.tables.own_columns",
-    "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_table",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
-    "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
 }
 # -> its chart.
@@ -36,7 +33,6 @@ CHARTS = {
     "Bands": "prediction.bands.charts.bands_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "NextForce": "fleets.force.chart.force_chart",
-    "Response": "motion.respond.chart.response_chart",
 }
 # -> what draws it where no chart holds it.
 DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}

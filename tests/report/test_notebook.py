@@ -20,7 +20,9 @@ from hdcal.notebook import RESULTS, TELLERS, Shown
 from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = sorted({*TELLERS, *RESULTS, "Case", "Diagnosis"} - {"DynamicPosterior"})
+NAMES = sorted(
+    {*TELLERS, *RESULTS, "Case", "Diagnosis", "Response"} - {"DynamicPosterior"}
+)
 
 
 def test_every_public_result_is_shown():
