@@ -20,7 +20,6 @@ _OWN = pytest.StashKey[str]()
 _NEVER_TRACED = (
     *("hdcal.cli", "hdcal.data", "hdcal.diagnosis", "hdcal.exported", "hdcal.report"),
     *("hdcal.design.inverse_design.inverse_design", "hdcal.design.wave_generator"),
-    "hdcal.motion.loss",
 )
 _COMPILED_PLAINLY = (
     "--xla_backend_optimization_level=1 --xla_cpu_parallel_codegen_split_count=1 "

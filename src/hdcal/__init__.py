@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
     from hdcal.motion.dynamic_posterior import DynamicPosterior
-    from hdcal.motion.respond.respond import respond
+    from hdcal.motion.respond import respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
     from hdcal.physics.registry import EFFECTS
@@ -70,7 +70,7 @@ _HOMES = {
     "predict": "prediction.bands.predict",
     "read_case": "data.reading",
     "residuals": "inference.residuals",
-    "respond": "motion.respond.respond",
+    "respond": "motion.respond",
     "study": "design.study.study",
     "summarise": "calibration.calibration",
     "wave_generator": "design.wave_generator.wave_generator",

@@ -28,7 +28,7 @@ from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.fleets.command import fleet
 from hdcal.fleets.force.command import margin
-from hdcal.motion.respond.command import respond
+from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.report.plain import printable
 from hdcal.shared_causes.command import causes

@@ -1,4 +1,4 @@
-"""`hdcal respond`: how a calibrated gear moves under a force."""
+"""`hdcal respond`: the motion of a calibrated gear under a force."""
 
 from pathlib import Path
 
@@ -13,25 +13,9 @@ from hdcal.cli.options import json_option, seed_option
 @command(short_help="How a calibrated gear moves under a force over time.")
 @click.argument("run", metavar="RUN")
 @force_options
-@click.option(
-    "--temperature",
-    type=float,
-    metavar="C",
-    help="Of the gear [°C] [default: the reference one, within what was tested].",
-)
-@click.option(
-    "--mass-kg",
-    "mass",
-    type=float,
-    metavar="KG",
-    help="Moved mass, if known [default: prior].",
-)
-@click.option(
-    "--damping",
-    type=float,
-    metavar="C",
-    help="Damping c, if known [N·s/mm] [default: prior].",
-)
+@click.option("--temperature", type=float, help="Of the gear [°C] [default: tested].")
+@click.option("--mass-kg", "mass", type=float, help="Moved mass [default: prior].")
+@click.option("--damping", type=float, help="Damping c [N·s/mm] [default: prior].")
 @click.option("--points", default=1001, show_default=True, help="Times to answer at.")
 @click.option("--draws", default=500, show_default=True, help="Gears to integrate.")
 @seed_option
@@ -52,15 +36,11 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
         drive = read_drive(console, force, columns, asked["amplitude"])
     from hdcal.inference.model_average import load_models
     from hdcal.motion.dynamic_posterior import DynamicPosterior
-    from hdcal.motion.respond.respond import respond as ask
-    from hdcal.motion.respond.summary import response_report, with_columns
-    from hdcal.report.write import write_report
+    from hdcal.motion.respond import respond as compute
 
     if asked["mass"] is not None:
         asked["mass"] *= 1e-3  # 1 kg = 1e-3 N·s²/mm
     given = {name: value for name, value in asked.items() if value is not None}
-    response = ask(load_models(run, [DynamicPosterior]), drive, **given)
-    report = response_report(response, console.command)
-    assert console.folder is not None
-    write_report(report, console.folder)
-    return console.answer(report.document, with_columns(report.answer, response), out)
+    found = compute(load_models(run, [DynamicPosterior]), drive, **given)
+    tables = {"response.csv": found.to_frame()}
+    return console.show(found, answer="response.json", tables=tables)
