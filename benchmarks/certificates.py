@@ -10,8 +10,6 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -27,9 +25,10 @@ from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.sample import sample
 from hdcal.inference.structure import decide_structure
-from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.mixture import Mixture, pooled
-from hdcal.prediction.engine.population_force import population_force
+from hdcal.prediction.conditions import Conditions
+from hdcal.prediction.members import one_member
+from hdcal.prediction.models import models_of
+from hdcal.prediction.simulate import simulate
 
 RIGS, AT = 300, 0.4
 MOUNTINGS, ROWS = 3, 10
@@ -159,27 +158,19 @@ def sampled(case: Case, seed: int) -> Posterior:
     return Posterior(case, theory, (), priors, tree, {}, (), settings)
 
 
-@jax.jit
-def ends(mixture: Mixture):
-    """Return the ends of the 95 % interval of the next member [N]."""
-    size = mixture.mean.shape[0]
-    whole = pooled([(jnp.full(size, 1.0 / size), mixture)])
-    return whole.quantile(jnp.array(TAILS[0])), whole.quantile(jnp.array(TAILS[1]))
-
-
 def intervals(posterior: Posterior) -> dict[str, np.ndarray]:
     """Return 95 % intervals of load, stiffness and the next reading."""
-    (cause,) = causes_of(posterior)
-
-    def at(quantity):
-        asked = population_force(cause, AT, "readings", quantity=quantity)
-        there = asked.at(posterior.case.gear.reference_temperature)
-        return there.mixture()
-
+    (model,) = models_of(posterior, allow_failed=True)
+    warm = posterior.case.gear.reference_temperature
+    load, reading = (
+        simulate(model, Conditions.of(AT, warm, quantity=quantity))
+        for quantity in ("load", "reading")
+    )
+    one = one_member(reading)
     return {
-        "load": np.quantile(np.asarray(at("load").mean[:, 0]), TAILS),
-        "stiffness": np.quantile(cause.values["stiffness"], TAILS),
-        "next reading": np.array(ends(at("reading"))),
+        "load": np.quantile(load.centre[:, 0], TAILS),
+        "stiffness": np.quantile(model.draws["stiffness"], TAILS),
+        "next reading": np.array([one.quantile(tail)[0, 0] for tail in TAILS]),
     }
 
 
