@@ -1,11 +1,12 @@
-"""Margins: what the numbers are, whose they are, and what is refused."""
+"""Margins: bounds, capacities, decisions, the inverse and the result itself."""
 
-from dataclasses import asdict
+from dataclasses import replace
+from datetime import date
 
-import jax
-import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import pytest
+from jsonschema import Draft202012Validator
 from posteriors import (
     batch,
     compensated,
@@ -13,24 +14,23 @@ from posteriors import (
     ramp_case,
     regressed,
     single,
+    spring,
     stiffer,
     with_leftover,
     written_posterior,
 )
 from rigs import make_gear
 from scipy import signal, stats
+from test_budget import exact
 
 import hdcal
-from hdcal.errors import InputError
-from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.forces import force_of, grid_records
-from hdcal.prediction.engine.mixture import Mixture
-from hdcal.prediction.engine.population import widest
-from hdcal.prediction.engine.population_force import SCORES, population_force
-from hdcal.prediction.engine.sizes import shifted, stiffness_ratio, tolerance_strata
-
-QUICK = {"sensitivities": False}
-QUANTILE = jax.jit(Mixture.quantile)
+from hdcal.prediction.conditions import Conditions
+from hdcal.prediction.margin.decision import decide
+from hdcal.prediction.margin.reached import first_crossing
+from hdcal.prediction.margin.result import Margin
+from hdcal.prediction.models import models_of
+from hdcal.prediction.simulate import simulate
+from hdcal.quantities import TORQUE
 
 
 @pytest.fixture(scope="module")
@@ -40,280 +40,331 @@ def gears():
 
 @pytest.fixture(scope="module")
 def one():
-    return single()
+    return single(size=1000)
 
 
-def members(posterior, at: float, *, count: int = 2000, seed: int = 3) -> np.ndarray:
+def drawn_members(posterior, at: float, count: int = 2000) -> np.ndarray:
     """Draw forces of new gears in new mountings, many for every draw [draw, member]."""
-    rng, d = np.random.default_rng(seed), posterior.draws
-    size, runs = len(d["K"]), posterior.problem.runs
-    # The centre of the population is as the margin has it, the members are not.
-    force = population_force(*causes_of(posterior), at, "specimens")
-    of_gears, of_runs = force.cause.values[SCORES].T
-    stiff = rng.normal(of_gears[:, None] / np.sqrt(runs), 1.0, (size, count))
-    zero = rng.normal(of_runs[:, None] / np.sqrt(runs), 1.0, (size, count))
+    rng, d = np.random.default_rng(3), posterior.draws
+    (model,) = models_of(posterior)
+    found = simulate(model, Conditions.of(at, 20.0), "specimens")
+    # Centre and bend are those of the margin, the members are not.
+    size = (len(d["K"]), count)
     load = d["stiffness"] * (at - d["deformation_offset"])
-    force = load[:, None] * (1.0 + d["specimen_sd"][:, None] * stiff)
-    zero = d["force_offset"][:, None] + d["run_offset_sd"][:, None] * zero
-    return force + zero + d["sigma"][:, None] * rng.normal(size=(size, count))
+    load = load + found.common["leftover"][:, 0]
+    gear = d["specimen_sd"][:, None] * rng.normal(size=size)
+    zero = d["run_offset_sd"][:, None] * rng.normal(size=size)
+    noise = d["sigma"][:, None] * rng.normal(size=size)
+    return found.centre + load[:, None] * gear + zero + noise
 
 
 def test_the_numbers_are_those_of_brute_force(gears):
-    found = hdcal.margin(gears, 0.4, limit_force=95.0, content=0.9, **QUICK)
-    drawn, level = members(gears, 0.4), found.worst
-    assert found.basis == "B-basis" and found.population == "specimens"
-    upper = np.quantile(np.quantile(drawn, 0.9, axis=1), 0.95)
+    found = hdcal.margin(gears, 0.4, limit_force=95.0, content=0.9)
+    drawn, level = drawn_members(gears, 0.4), found.worst
+    assert found.population == "specimens"
+    needed = np.quantile(drawn, 0.9, axis=1)
+    assert level.upper_bound_N == pytest.approx(np.quantile(needed, 0.95), rel=5e-3)
     lower = np.quantile(np.quantile(drawn, 0.1, axis=1), 0.05)
-    assert level.upper_bound_N == pytest.approx(upper, rel=5e-3)
     assert level.lower_bound_N == pytest.approx(lower, rel=5e-3)
     ends = np.quantile(drawn, [0.025, 0.5, 0.975])
     got = [level.member_N.lo, level.member_N.median, level.member_N.hi]
     np.testing.assert_allclose(got, ends, rtol=5e-3)
-    risk = level.exceedance
-    assert risk.probability == pytest.approx(np.mean(drawn > 95.0), rel=0.03)
-    assert risk.lo < risk.probability < risk.hi
-    assert risk.beta == pytest.approx(-stats.norm.ppf(risk.probability))
-    assert risk.beta_lo < risk.beta_at_confidence < risk.beta < risk.beta_hi
+    risk, above = level.exceedance, np.mean(drawn > 95.0, axis=1)
+    assert risk.probability == pytest.approx(above.mean(), rel=0.03)
+    assert risk.lo == pytest.approx(np.quantile(above, 0.025), abs=1e-3)
+    assert risk.hi == pytest.approx(np.quantile(above, 0.975), rel=0.05)
     assert level.capacity_N == level.upper_bound_N
-    expected = np.quantile(drawn, 0.9)
-    assert level.capacity_predictive_N == pytest.approx(expected, rel=5e-3)
-    members_need = np.quantile(drawn, 0.9, axis=1)
-    middle = np.median(members_need)
-    assert level.capacity_median_N == pytest.approx(middle, rel=5e-3)
+    assert level.capacity_median_N == pytest.approx(np.median(needed), rel=5e-3)
 
 
 def test_a_capacity_meets_what_it_was_asked_to(gears):
-    asked = hdcal.margin(gears, 0.4, required_probability=0.999, **QUICK).worst
-    expected, sure = asked.capacity_predictive_N, asked.capacity_N
-    risk = hdcal.margin(gears, 0.4, limit_force=expected, **QUICK).worst.exceedance
-    assert risk.probability == pytest.approx(1e-3, rel=1e-4)
-    risk = hdcal.margin(gears, 0.4, limit_force=sure, **QUICK).worst.exceedance
+    asked = hdcal.margin(gears, 0.4, required_probability=0.999).worst
+    risk = hdcal.margin(gears, 0.4, limit_force=asked.capacity_N).worst.exceedance
     assert risk.at_confidence == pytest.approx(1e-3, rel=1e-2)
 
 
-@pytest.mark.parametrize("limit", [0.02, 90.0])
-def test_no_probability_is_nothing_or_all(one, limit: float):
-    risk = hdcal.margin(one, 0.4, limit_force=80.0 * limit, **QUICK).worst.exceedance
-    for share in (risk.probability, risk.lo, risk.hi, risk.at_confidence):
-        assert 0.0 < share < 1.0
-    for beta in (risk.beta, risk.beta_lo, risk.beta_hi, risk.beta_at_confidence):
-        assert np.isfinite(beta) and abs(beta) > 8.0
-
-
-def test_the_population_is_the_widest_that_was_tested(gears, one):
-    assert (widest(gears.problem), widest(one.problem)) == ("specimens", "readings")
+def test_bounds_are_the_wider_the_wider_the_population(gears):
     found = [
-        hdcal.margin(gears, 0.4, population=p, **QUICK)
-        for p in ("readings", "mountings", "specimens")
+        hdcal.margin(gears, 0.4, population=population)
+        for population in ("readings", "mountings", "specimens", None)
     ]
     bounds = [each.worst.upper_bound_N for each in found]
-    assert bounds == sorted(bounds)
-    assert [each.basis for each in found] == ["", "", "A-basis"]
-    alone = hdcal.margin(one, 0.4, **QUICK)
-    assert alone.basis == ""
-
-
-@pytest.mark.parametrize("population", ["mountings", "specimens"])
-def test_one_member_is_no_population(one, population):
-    with pytest.raises(InputError, match="which says nothing of how much others"):
-        hdcal.margin(one, 0.4, population=population)
-
-
-def test_two_gears_are_a_population_one_is_not():
-    assert widest(batch(2, 20).problem) == "specimens"
+    assert bounds[0] < bounds[1] < bounds[2] == bounds[3]
 
 
 def test_the_load_has_no_zero_and_no_noise(one):
-    found = hdcal.margin(one, 0.4, quantity="load", **QUICK)
+    found = hdcal.margin(one, 0.4, quantity="load").worst
     draws = one.draws
     load = draws["stiffness"] * (0.4 - draws["deformation_offset"])
-    assert found.worst.upper_bound_N == pytest.approx(np.quantile(load, 0.95), rel=1e-4)
+    assert found.upper_bound_N == pytest.approx(np.quantile(load, 0.95), rel=2e-3)
     # Nothing scatters: what any share needs is what all need.
-    assert found.worst.force_N.hi == pytest.approx(found.worst.member_N.hi, rel=1e-3)
+    assert found.force_N.hi == pytest.approx(found.member_N.hi, rel=1e-3)
 
 
-def test_the_worst_temperature_counts():
+def test_of_several_temperatures_the_worst_counts():
     """The rig does not drift: the gear alone is stiffer where it is cold."""
-    warm = {"temperature": [-20.0, 20.0, 80.0]}
-    found = hdcal.margin(single(compensated()), 0.4, **warm, **QUICK)
-    assert found.worst.temperature_C == -20.0
+    found = hdcal.margin(single(compensated()), 0.4, temperature=[-20.0, 20.0, 80.0])
+    assert found.worst == found.levels[0] and found.worst.temperature_C == -20.0
     bounds = [level.upper_bound_N for level in found.levels]
-    assert found.worst.upper_bound_N == pytest.approx(max(bounds), rel=1e-6)
-    lows = [level.lower_bound_N for level in found.levels]
-    assert found.worst.lower_bound_N == pytest.approx(min(lows), rel=1e-6)
-    drop = bounds[0] - bounds[2]
-    assert drop == pytest.approx(205.0 * 0.4 * 3e-4 * 100.0, abs=0.8)
+    drop = 205.0 * 0.4 * 3e-4 * 100.0
+    assert bounds[0] - bounds[2] == pytest.approx(drop, abs=0.8)
     assert [level.tested for level in found.levels] == [False, True, False]
+    frame = found.to_frame()
+    assert frame["temperature_C"].tolist() == [-20.0, 20.0, 80.0]
+    assert {"force_N", "force_lo", "force_hi", "upper_bound_N"} <= {*frame}
+    assert list(found.charts()) == ["margin", "budget"]
 
 
-def test_tolerances_widen_as_brute_force_says(one):
-    sizes = {"wall_thickness": 0.02, "radius": 0.05}
-    geometry = one.case.gear.geometry
-    strata = tolerance_strata(geometry, sizes, "ring")
-    rng = np.random.default_rng(0)
-    shifts = {n: t * rng.uniform(-1.0, 1.0, 200_000) for n, t in sizes.items()}
-    made = shifted(geometry, shifts)
-    drawn = np.asarray(stiffness_ratio(made, geometry, "ring"))
-    assert strata.weight @ strata.factor == pytest.approx(drawn.mean(), abs=2e-4)
-    square = strata.weight @ (strata.factor**2 + strata.width**2)
-    assert square == pytest.approx(np.mean(drawn**2), abs=4e-4)
-    asked = {f"{name}_mm": size for name, size in sizes.items()}
-    found = hdcal.margin(one, 0.4, tolerances=asked, **QUICK)
-    draws, size = one.draws, len(one.draws["K"])
-    load = draws["stiffness"] * (0.4 - draws["deformation_offset"])
-    factor = rng.choice(drawn, (size, 500))
-    noise = draws["sigma"][:, None] * rng.normal(size=(size, 500))
-    force = load[:, None] * factor + draws["force_offset"][:, None] + noise
-    upper = np.quantile(np.quantile(force, 0.99, axis=1), 0.95)
-    assert found.worst.upper_bound_N == pytest.approx(upper, rel=3e-3)
-
-
-def test_scatter_through_a_bent_force_is_that_of_brute_force():
-    """Where the force is not linear in the stiffness, the split normal follows it."""
-    gears = batch(6, 40)
-    curvature = {"force_saturation.curvature": np.full(40, 2e-5)}
-    draws = {**gears.draws, **curvature, "specimen_sd": np.full(40, 0.08)}
-    bent = written_posterior(gears.case, draws, effects=["force_saturation"])
-    future = population_force(*causes_of(bent), 0.4, "specimens")
-    problem = bent.problem
-    row = {name: values[7] for name, values in future.cause.values.items()}
-    rng = np.random.default_rng(1)
-    gear, zero, noise = rng.normal(size=(3, 100_000))
-    gear, zero = (
-        score + centre / np.sqrt(6.0)
-        for score, centre in zip((gear, zero), row[SCORES], strict=False)
+def test_rounded_readings_have_half_a_step_more():
+    step = 0.98
+    plain, rounded = (
+        hdcal.margin(exact_of(resolution), 0.1, limit_force=24.0)
+        for resolution in (0.0, step)
     )
-    records = grid_records(np.array([0.4]), np.array([20.0]), np.ones(1), 0.0)
+    half, one, other = 0.5 * step, plain.worst, rounded.worst
+    for name, sign in (
+        ("upper_bound_N", 1.0),
+        ("lower_bound_N", -1.0),
+        ("capacity_N", 1.0),
+        ("capacity_median_N", 1.0),
+    ):
+        moved = getattr(other, name) - getattr(one, name)
+        assert moved == pytest.approx(sign * half, abs=1e-6)
+    least = hdcal.margin(exact_of(0.0), 0.1, limit_force=24.0 - half).worst
+    expected = least.exceedance.probability
+    assert other.exceedance.probability == pytest.approx(expected, rel=1e-9)
+    # The rounding is a uniform component of one member.
+    sd = np.hypot(plain.combined_standard_uncertainty_N, step / 12.0**0.5)
+    assert rounded.combined_standard_uncertainty_N == pytest.approx(sd)
+    assert rounded.step_N == step
+    rows = {row.component: row for row in rounded.budget}
+    resolution = rows["resolution of the force reading"]
+    assert resolution.distribution == "rectangular" and resolution.type_ == "B"
+    assert resolution.contribution_N == pytest.approx(step / 12.0**0.5)
+    load = hdcal.margin(exact_of(step), 0.1, quantity="load")
+    assert load.step_N == 0.0
 
-    def mean(factor):
-        return force_of(problem, row, records, factor=factor)[0][0]
 
-    factor = jnp.asarray(1.0 + row["specimen_sd"] * gear)
-    force = np.asarray(jax.jit(jax.vmap(mean))(factor))
-    drawn = force + row["run_offset_sd"] * zero + row["sigma"] * noise
-    found = future.mixture()
-    for share in (0.01, 0.5, 0.99):
-        expected = np.quantile(drawn, share)
-        assert float(QUANTILE(found, share)[7]) == pytest.approx(expected, rel=3e-3)
-    # The tangent alone would miss it: the force bends by newtons over the gears.
-    straight = mean(1.0) + (mean(1.001) - mean(0.999)) / 2e-3 * (factor - 1.0)
-    assert np.max(np.abs(straight - force)) > 2.0
+def exact_of(resolution: float):
+    """Return the gear of `exact` with rounded readings."""
+    known = exact()
+    gear = replace(known.case.gear, force_resolution=resolution)
+    case = replace(known.case, gear=gear)
+    draws = {n: v for n, v in known.draws.items() if n != "noise_correlation"}
+    return written_posterior(case, draws)
 
 
-def test_the_inverse_is_the_other_way_round(gears):
-    found = hdcal.margin(gears, 0.4, given_force=80.0, content=0.9, **QUICK).reached
+# --- decisions ---
+
+
+@pytest.mark.parametrize(
+    ("rule", "limit", "statement", "guard"),
+    [
+        ("guarded", 12.0, "conforms", 2.0),
+        ("guarded", np.nextafter(12.0, 0.0), "undecided", 2.0),
+        ("guarded", 9.0, "undecided", 2.0),
+        ("guarded", np.nextafter(9.0, 0.0), "does not conform", 2.0),
+        ("simple", 10.0, "conforms", 0.0),
+        ("simple", np.nextafter(10.0, 0.0), "does not conform", 0.0),
+    ],
+)
+def test_the_rule_at_its_boundaries(rule, limit, statement: str, guard: float):
+    found = decide(rule, limit, 10.0, 9.0, 12.0, 0.1)
+    assert (found.statement, found.guard_band_N) == (statement, guard)
+    assert found.acceptance_limit_N == limit - guard
+    assert found.probability_of_conformity == 0.9
+
+
+def test_the_risks_are_those_of_a_normal():
+    known = exact(4000)
+    middle = hdcal.margin(known, 0.1).estimate_N
+    for above in (-4.0, -1.0, 0.0, 1.0, 2.9, 3.0, 6.0):
+        found = hdcal.margin(known, 0.1, limit_force=middle + above).decision
+        risk = stats.norm.sf(above, scale=1.5)
+        assert found.false_accept_risk == pytest.approx(risk, rel=0.05)
+        assert found.guard_band_N == pytest.approx(1.96 * 1.5, rel=0.02)
+        expected = "conforms" if above > 2.95 else "undecided"
+        assert found.statement == ("does not conform" if above < -2.95 else expected)
+    simple = hdcal.margin(known, 0.1, limit_force=middle + 0.01, rule="simple").decision
+    assert (simple.statement, simple.guard_band_N) == ("conforms", 0.0)
+    assert hdcal.margin(known, 0.1).decision is None
+
+
+# --- the inverse ---
+
+
+def test_the_inverse_inverts(gears):
+    found = hdcal.margin(gears, 0.4, given_force=80.0, content=0.9).reached
     # At the deformation that 90 % reach at least, 90 % need at most this force.
-    again = hdcal.margin(gears, found.lower_bound_mm, content=0.9, **QUICK).worst
-    assert again.upper_bound_N == pytest.approx(80.0, rel=2e-3)
-    again = hdcal.margin(gears, found.upper_bound_mm, content=0.9, **QUICK).worst
-    assert again.lower_bound_N == pytest.approx(80.0, rel=2e-3)
-    again = hdcal.margin(gears, found.median_mm, **QUICK).worst
+    again = hdcal.margin(gears, found.lower_bound_mm, content=0.9).worst
+    assert again.upper_bound_N == pytest.approx(80.0, rel=4e-3)
+    again = hdcal.margin(gears, found.upper_bound_mm, content=0.9).worst
+    assert again.lower_bound_N == pytest.approx(80.0, rel=4e-3)
+    again = hdcal.margin(gears, found.median_mm).worst
     assert again.force_N.median == pytest.approx(80.0, rel=1e-3)
+    assert found.lower_bound_mm < found.lo_mm < found.median_mm
+    assert found.median_mm < found.hi_mm < found.upper_bound_mm and found.tested
+    assert found.searched_mm == pytest.approx((0.0, 1.08))
+    # By the mean line.
+    draws = gears.draws
+    place = (80.0 - draws["force_offset"]) / draws["stiffness"]
+    assert found.median_mm == pytest.approx(np.median(place), rel=5e-3)
+
+
+def test_a_force_that_nothing_reaches_has_no_deformation(gears):
+    found = hdcal.margin(gears, 0.4, given_force=600.0).reached
+    assert found.median_mm is found.lower_bound_mm is None and not found.tested
 
 
 def test_what_is_reached_first_is_reached():
-    """Correlated readings know little of a bend: far out a share comes back again."""
+    """Correlated readings leave a wide bend: far out a quantile falls again."""
     rng = np.random.default_rng(0)
     place = np.linspace(0.01, 0.54, 60)
     noise = signal.lfilter([0.96], [1.0, -0.8], rng.normal(size=260))[200:]
     found = regressed(place, 150.0 * place - 1.0 + noise, rng)
-    reached = hdcal.margin(found, 0.4, given_force=60.0, **QUICK).reached
-    assert reached.lower_bound_mm < reached.median_mm < reached.upper_bound_mm < 0.45
-    again = hdcal.margin(found, reached.upper_bound_mm, **QUICK).worst
-    assert again.lower_bound_N == pytest.approx(60.0, rel=2e-3)
+    reached = hdcal.margin(found, 0.4, given_force=60.0).reached
+    assert 0.3 < reached.lower_bound_mm < reached.median_mm < reached.upper_bound_mm
+    assert reached.upper_bound_mm < 0.5
 
 
-def test_a_force_that_nothing_reaches_is_said(gears):
-    found = hdcal.margin(gears, 0.4, given_force=600.0, **QUICK)
-    assert found.reached.median_mm is found.reached.lower_bound_mm is None
-    assert not found.reached.tested
+def test_the_first_crossing_is_interpolated():
+    places = np.array([0.0, 1.0, 2.0, 3.0])
+    curves = np.array(
+        [[0.0, 2.0, 1.0, 4.0], [5.0, 6.0, 7.0, 8.0], [0.0, 0.0, 0.0, 0.0]]
+    )
+    found = first_crossing(curves, 1.5, places)
+    assert found.tolist() == [0.75, -np.inf, np.inf]
 
 
-@pytest.mark.thorough
-def test_towards_the_other_sense_no_spread_grows():
-    """Of a gear pushed and pulled, 60 N are reached as if it had only been pushed."""
-    rng = np.random.default_rng(0)
-    place = np.linspace(-0.5, 0.5, 60)
-    noise = signal.lfilter([1.44], [1.0, -0.8], rng.normal(size=260))[200:]
-    found = regressed(place, 150.0 * place - 1.0 + noise, rng)
-    reached = hdcal.margin(found, 0.4, given_force=60.0, **QUICK).reached
-    assert reached.searched_mm == pytest.approx((-0.5, 1.0))
-    assert 0.3 < reached.lower_bound_mm < reached.upper_bound_mm < 0.5
+# --- beyond the data, several models, other quantities ---
 
 
-def test_beyond_the_tested_deformation_a_bend_widens(one):
-    inside = hdcal.margin(one, 0.5, **QUICK)
-    beyond = hdcal.margin(one, 0.7, **QUICK)
-    assert inside.extrapolated == ()
-    assert len(beyond.extrapolated) == 1
-
-    def width(found):
-        return found.worst.force_N.hi - found.worst.force_N.lo
-
+def test_beyond_the_tested_deformation_the_bend_widens(one):
+    inside, beyond = (hdcal.margin(one, at) for at in (0.5, 0.7))
+    spans = [found.worst.force_N for found in (inside, beyond)]
+    widths = [span.hi - span.lo for span in spans]
+    assert inside.extrapolated == () and inside.beyond_tested == 0.0
+    assert beyond.extrapolated and not beyond.worst.tested
+    assert beyond.beyond_tested == pytest.approx(0.16 / 0.52)
     # More than the line alone, which widens in proportion.
-    assert width(beyond) > width(inside) * 0.7 / 0.5 + 0.5
-    assert not beyond.worst.tested
+    assert widths[1] > widths[0] * 0.7 / 0.5 + 0.5
+    assert beyond.bend_N[1] > 2.0 * inside.bend_N[1]
 
 
-def test_a_fitted_leftover_is_used_and_goes_on_without_a_step():
-    posterior = with_leftover()
-    ends = [0.54 - 1e-7, 0.54, 0.54 + 1e-7]
-    inside, edge, beyond = (hdcal.margin(posterior, at, **QUICK) for at in ends)
-    widths = [
-        found.worst.force_N.hi - found.worst.force_N.lo
-        for found in (inside, edge, beyond)
-    ]
-    np.testing.assert_allclose(widths, widths[1], rtol=1e-3)
-    bands = hdcal.predict(posterior, [0.54])
-    got = edge.worst.force_N
-    assert got.lo == pytest.approx(bands.with_gap_lo_N[0], rel=1e-3)
-    assert got.hi == pytest.approx(bands.with_gap_hi_N[0], rel=1e-3)
+def test_a_fitted_leftover_is_in_the_force():
+    posterior = with_leftover(1000)
+    found = hdcal.margin(posterior, 0.3).worst.force_N
+    bands = hdcal.predict(posterior, [0.3])
+    assert (found.lo, found.hi) == pytest.approx(
+        (bands.with_gap_lo_N[0], bands.with_gap_hi_N[0])
+    )
+    columns = posterior.problem.discrepancy.columns(np.array([0.3]), np.ones(1))
+    draws = posterior.draws
+    mean = draws["stiffness"] * (0.3 - draws["deformation_offset"])
+    mean = mean + draws["force_offset"] + draws["gap_weights"] @ np.asarray(columns)[0]
+    assert found.median == pytest.approx(np.median(mean), rel=1e-6)
 
 
-def test_causes_are_averaged_by_probability(gears):
+def test_models_are_averaged_by_their_probability(gears):
     other = stiffer(gears, 1.1)
-    both = hdcal.margin([(3.0, gears), (1.0, other)], 0.4, limit_force=95.0, **QUICK)
-    each = [hdcal.margin(p, 0.4, limit_force=95.0, **QUICK) for p in (gears, other)]
+    both = hdcal.margin([(3.0, gears), (1.0, other)], 0.4)
+    each = [hdcal.margin(p, 0.4) for p in (gears, other)]
     for model, alone, share in zip(both.models, each, (0.75, 0.25), strict=True):
         assert model.probability == share
-        assert model.upper_bound_N == pytest.approx(alone.worst.upper_bound_N, rel=1e-9)
-    chances = [found.worst.exceedance.probability for found in each]
-    mean = 0.75 * chances[0] + 0.25 * chances[1]
-    assert both.worst.exceedance.probability == pytest.approx(mean, rel=1e-9)
+        assert model.upper_bound_N == pytest.approx(alone.worst.upper_bound_N)
+        assert model.lower_bound_N == pytest.approx(alone.worst.lower_bound_N)
     low, high = (found.worst.upper_bound_N for found in each)
     assert low < both.worst.upper_bound_N < high
-    # Twice the same model says what it says alone.
-    twice = hdcal.margin([(0.3, gears), (0.7, gears)], 0.4, **QUICK)
+    mean = 0.75 * each[0].estimate_N + 0.25 * each[1].estimate_N
+    assert both.estimate_N == pytest.approx(mean) and each[0].models == ()
+    # Twice the same model is that model.
+    twice = hdcal.margin([(0.3, gears), (0.7, gears)], 0.4)
     assert twice.worst.upper_bound_N == pytest.approx(low, rel=2e-3)
+    assert twice.causes == {"none": 1.0}
 
 
 def test_the_same_seed_gives_the_same_margin(gears):
     first, second, third = (
-        asdict(hdcal.margin(gears, 0.4, seed=seed, **QUICK)) for seed in (1, 1, 2)
+        hdcal.margin(gears, 0.6, seed=seed).to_dict() for seed in (1, 1, 2)
     )
     assert first == second != third
 
 
-@pytest.mark.thorough
-def test_the_load_height_matters_to_the_cup():
-    cup = single(make_gear(theory="cup"), 200)
-    plain = hdcal.margin(cup, 0.4, **QUICK)
-    wide = hdcal.margin(cup, 0.4, tolerances={"load_height_mm": 3.0}, **QUICK)
-    assert wide.worst.upper_bound_N > plain.worst.upper_bound_N + 2.0
-
-
-@pytest.mark.thorough
 def test_unloading_begins_at_the_top():
-    case = ramp_case()
-    draws = plain_draws(case, 200) | {
+    case = ramp_case(known={"unloading"}, sense=np.tile([1.0, -1.0], 15))
+    loop = {
         "hysteresis.force": np.full(200, 4.0),
         "hysteresis.reach": np.full(200, 0.05),
     }
-    looped = ramp_case(known={"unloading"}, sense=np.tile([1.0, -1.0], 15))
-    posterior = written_posterior(looped, draws, effects=["hysteresis"])
+    posterior = written_posterior(
+        case, plain_draws(case, 200) | loop, effects=["hysteresis"]
+    )
     up, down = (
-        hdcal.margin(posterior, 0.4, direction=way, quantity="load", **QUICK)
+        hdcal.margin(posterior, 0.4, direction=way, quantity="load")
         for way in ("up", "down")
     )
     gap = up.worst.force_N.median - down.worst.force_N.median
-    assert gap == pytest.approx(8.0, abs=0.1)
+    assert gap == pytest.approx(8.0, abs=0.1) and down.turn_mm == 0.54
+
+
+def test_the_load_height_enters_a_cup():
+    cup = single(make_gear(theory="cup"), 400)
+    plain, wide = (
+        hdcal.margin(cup, 0.4, tolerances=sizes).worst.upper_bound_N
+        for sizes in ({}, {"load_height_mm": 3.0})
+    )
+    assert wide > plain + 2.0
+
+
+# --- the result ---
+
+
+def validate(found: Margin) -> dict:
+    schema = Margin.json_schema(found.units)
+    Draft202012Validator.check_schema(schema)
+    answer = found.to_dict()
+    Draft202012Validator(schema).validate(answer)
+    return answer
+
+
+def test_the_result_describes_itself(gears):
+    found = hdcal.margin(
+        [(0.6, gears), (0.4, stiffer(gears, 1.05))],
+        0.6,
+        limit_force=140.0,
+        given_force=80.0,
+        temperature=[20.0, 60.0],
+        tolerances={"wall_thickness_mm": 0.02},
+    )
+    answer = validate(found)
+    assert answer["schema"] == "hdcal.margin/3" and answer["status"] == "ok"
+    assert answer["worst"] == answer["levels"][1]
+    assert answer["tolerances_mm"] == {"wall_thickness_mm": 0.02}
+    assert answer["data"]["sha256"] == gears.case.data_sha256
+    assert answer["reached"]["force_N"] == 80.0
+    budget = found.budget_frame()
+    assert budget["share"].sum() == pytest.approx(1.0) and "type" in budget
+    assert isinstance(found.to_frame(), pd.DataFrame) and len(found.to_frame()) == 2
+    assert "<table" in found._repr_html_() and found.headline in found.text(400)
+    axes = found.plot()
+    assert axes.get_xlabel() == "temperature [°C]"
+    page = found.page("hdcal margin RUN")
+    assert "<script" in page and "hdcal margin RUN" in page
+    with pytest.raises(ValueError):
+        found.model_copy(update={}).content = 0.5
+
+
+def test_a_torque_has_its_own_units():
+    pressed = spring()
+    twisted = replace(pressed, case=replace(pressed.case, units=TORQUE))
+    found = hdcal.margin(twisted, 0.4, limit_force=90.0, given_force=60.0)
+    answer = validate(found)
+    assert found.part == "part" and "angle_rad" in answer
+    assert answer["reached"]["median_rad"] == pytest.approx(61.0 / 205.0, rel=0.02)
+    assert "upper_bound_N_m" in answer["worst"] and "torque_N_m" in answer["worst"]
+    assert not any(key.endswith(("_N", "_mm")) for key in answer)
+    assert {"torque_N_m", "upper_bound_N_m"} <= {*found.to_frame()}
+    assert {"contribution_N_m", "sensitivity_N_m_per_unit"} <= {*found.budget_frame()}
+    for text in (found.text(), found.certificate(date(2026, 1, 2))):
+        assert "N·m" in text and "force" not in text
+    assert "torque [N·m]" in (found.plot().get_ylabel(), found.plot().get_xlabel())

@@ -152,6 +152,13 @@ def single(gear=None, size: int = 2000) -> Posterior:
     return written_posterior(case, plain_draws(case, size))
 
 
+def spring(size: int = 400) -> Posterior:
+    """Return a posterior of a spring, of which no sizes are known."""
+    gear = make_gear(theory="spring")
+    sizes = replace(gear.geometry, radius=np.nan)
+    return single(replace(gear, geometry=sizes, K_theory="spring"), size)
+
+
 def batch(count: int = 6, size: int = 2000) -> Posterior:
     """Return a posterior of several gears, each in a mounting of its own."""
     label = np.repeat(np.arange(count), 10)

@@ -129,9 +129,12 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
     """
     if isinstance(models, Posterior):
         return [(1.0, models)]
+    if isinstance(models, list | tuple):
+        if all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in models):
+            return models
+        words, remedy = "are no pairs", "Give [(0.6, posterior), (0.4, other)]"
+        raise InputError([Finding("models", words, remedy)])
     held = getattr(models, "posteriors", None)
-    if held is None and isinstance(models, Sequence):
-        return models
     if held:
         return list(held.values())
     words = f"{type(models).__name__} is no calibrated model"

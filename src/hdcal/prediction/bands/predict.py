@@ -231,7 +231,8 @@ def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
     tested = members = simulate_all(models, at, seed=seed)
     if widest(problem) != "readings":
         members = simulate_all(models, at, widest(problem), seed=seed)
-    rng, count = np.random.default_rng(seed), len(members.weight)
+    # Independent of the scores of the draws, which have the same seed.
+    rng, count = np.random.default_rng((seed, 1)), len(members.weight)
     even = (np.arange(count) + 0.5) / count
     levels, scores, rounding = (rng.permutation(even) for _ in range(3))
     new = members.sample(levels, ndtri(scores))
@@ -272,17 +273,14 @@ def _deformation_findings(
     case: Case, deformation: np.ndarray, direction: str | None
 ) -> list[Finding]:
     """Return what is wrong with deformations [mm], such as another unit."""
-    name, tested = "deformation", np.asarray(case.records.deformation)
-    unit = case.units.displacement_unit
+    name, unit = "deformation", case.units.displacement_unit
+    tested = float(np.max(np.abs(case.records.deformation)))
     if deformation.size == 0:
         return [Finding(name, "is empty", f"give numbers in {unit}")]
     if wrong := implausible(name, deformation, case.units.displacement):
         return wrong
-    worst = float(np.max(np.abs(deformation)))
-    if worst >= case.gear.reach:
-        words = f"{worst:g} mm on a radius of {case.gear.geometry.radius:g} mm"
-        return [Finding(name, words, "Give it in mm")]
-    wrong = far_findings(worst, float(np.max(np.abs(tested))), unit=unit)
+    worst = float(deformation[np.argmax(np.abs(deformation))])
+    wrong = far_findings(worst, tested, case.gear.reach, unit)
     sense = SENSE.get(direction or "", _loading(deformation, case.records))
     each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
     return wrong + next(filter(None, each), [])

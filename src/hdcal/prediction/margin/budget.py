@@ -132,9 +132,10 @@ def budget(
         for name, row in rows.items():
             found[name] = found.get(name, np.zeros(3)) + share * np.array(row)
     total = float(sum(row[2] for row in found.values()))
-    small = [n for n, row in found.items() if not row[2] > _LEAST_SHARE * total]
-    for name in small:
-        found["calibration"] = found["calibration"] + found.pop(name)[2]
+    rest = found.pop("calibration")
+    for name in [n for n, row in found.items() if row[2] <= _LEAST_SHARE * total]:
+        rest = rest + found.pop(name)[2]
+    found["calibration"] = rest
     listed = [
         _row(n, row, total, models[0], direction, units) for n, row in found.items()
     ]

@@ -16,6 +16,7 @@ from hdcal.prediction.conditions import (
     SENSE,
     Direction,
     excluded_findings,
+    far_findings,
     level_findings,
     slip_findings,
     temperature_findings,
@@ -107,12 +108,11 @@ def require_answerable(
         wrong += level_findings(asked.temperature, "temperature") or (
             temperature_findings(gear, main.draws, asked.temperature)
         )
+        shares = {"content": asked.content, "confidence": asked.confidence}
+        if asked.required != asked.content:
+            shares["required_probability"] = asked.required
         wrong += share_findings(
-            {
-                "content": asked.content,
-                "confidence": asked.confidence,
-                "required_probability": asked.required,
-            },
+            shares,
             sum(model.size for model in models),
             ", or calibrate with more draws",
         )
@@ -133,15 +133,15 @@ def _deformation(
     posterior: Posterior, deformation: float, movement: float
 ) -> Iterator[Finding]:
     gear, units = posterior.case.gear, posterior.case.units
+    tested = float(np.max(np.abs(posterior.case.records.deformation)))
     name, unit = "deformation", units.displacement_unit
     if wrong := implausible(name, deformation, units.displacement):
         yield from wrong
     elif deformation == 0.0:
         words = f"{deformation:g} {unit} is no {units.displacement}"
         yield Finding(name, words, f"Give a number of {unit}")
-    elif abs(deformation) >= gear.reach:
-        words = f"{deformation:g} mm on a radius of {gear.geometry.radius:g} mm"
-        yield Finding(name, words, "Give it in mm")
+    elif wrong := far_findings(deformation, tested, gear.reach, unit):
+        yield from wrong
     else:
         yield from excluded_findings(posterior.case, deformation, movement)
 

@@ -224,7 +224,8 @@ class Margin(Result):
 
     def budget_frame(self) -> pd.DataFrame:
         """Return the uncertainty budget as a table."""
-        return pd.DataFrame([row.columns() for row in self.budget])
+        rows = pd.DataFrame([row.columns() for row in self.budget])
+        return rows.rename(columns=self.units.key)
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the force with its bounds, and the budget."""

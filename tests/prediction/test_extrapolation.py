@@ -1,0 +1,165 @@
+"""The bend that readings leave possible: closed forms, continuity and edge cases."""
+
+import numpy as np
+import pytest
+from posteriors import ramp_case, regressed, single, with_leftover, written_posterior
+from slices import slice_of
+
+import hdcal
+from hdcal.prediction.extrapolation import FADE, SIZES, covariance, fit_bends
+
+ENDS = ("lo", "median", "hi")
+
+
+def integrated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the covariance of both Wiener processes by numerical integration."""
+    start = np.linspace(0.0, 2.0, 4001)
+    left = np.clip(one[:, None, None] - start, 0.0, None)
+    right = np.clip(other[None, :, None] - start, 0.0, None)
+    return np.trapezoid(left * right + (left * right) ** 2 / 4.0, start, axis=-1)
+
+
+def test_the_covariance_is_that_of_integrated_wiener_processes():
+    one, other = np.array([0.1, 0.5, 1.0, 1.8]), np.array([0.2, 1.0, 1.5])
+    expected = integrated(one, other)
+    np.testing.assert_allclose(covariance(one, other), expected, rtol=1e-3)
+    same = np.diag(integrated(one, one))
+    np.testing.assert_allclose(covariance(one, one, pairs=False), same, rtol=1e-3)
+
+
+def curved(seed: int = 3, rows: int = 20):
+    """Return rows of a curve, and the posterior of the straight model."""
+    x, rng = np.linspace(0.02, 0.52, rows), np.random.default_rng(seed)
+    left = rng.normal(0.0, 0.5, rows) + 3.0 * (x / 0.52) ** 3
+    return x, left, regressed(x, 200.0 * x + left, rng)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_the_bend_is_that_of_a_dense_process(side: int):
+    """A Gaussian process with a free line, from which the fitted line is taken off."""
+    x, left, posterior = curved()
+    bend = fit_bends(posterior)[side]
+    assert (bend.far, bend.end) == ((0.52, 0.02), (0.02, 0.52))[side]
+    asked = np.array([[0.3, 0.02, -0.1, -0.4], [0.25, 0.52, 0.6, 0.9]][side])
+    mean, sd = bend.law(asked)
+
+    place, new = ((at - bend.far) / (bend.end - bend.far) for at in (x, asked))
+    lines, over = (np.stack([np.ones_like(t), t], axis=1) for t in (place, new))
+    off = np.linalg.lstsq(lines, left, rcond=None)[0]
+    for law in (20, 75, 110):
+        size = bend.size[law]
+        # Laws of one noise stand side by side: they differ by their size alone.
+        first = len(SIZES) * (law // len(SIZES))
+        sizes, spread = bend.size[first : first + 2] ** 2, bend.spread[0, first:]
+        strength = (spread[1] - spread[0]) / (sizes[1] - sizes[0])
+        noise = np.sqrt(spread[0] - strength * sizes[0])
+        square, free = size**2, 1e5 * size**2
+        known = square * integrated(place, place) + noise**2 * np.eye(20)
+        known += free * lines @ lines.T
+        cross = square * integrated(new, place) + free * over @ lines.T
+        own = square * integrated(new, new) + free * over @ over.T
+        expected = cross @ np.linalg.solve(known, left) - over @ off
+        spread = own - cross @ np.linalg.solve(known, cross.T)
+        spread -= noise**2 * over @ np.linalg.solve(lines.T @ lines, over.T)
+        np.testing.assert_allclose(mean[law], expected, rtol=1e-2, atol=2e-2)
+        np.testing.assert_allclose(sd[law] ** 2, np.diag(spread), rtol=3e-2, atol=1e-3)
+
+
+def test_laws_have_the_probability_of_the_residuals():
+    """Curved residuals make a larger bend probable than straight ones."""
+    x, rng = np.linspace(0.02, 0.54, 40), np.random.default_rng(1)
+    means = []
+    for curve in (0.0, 20.0):
+        force = 200.0 * x + curve * x**2 + rng.normal(0.0, 0.3, 40)
+        bend = fit_bends(regressed(x, force, rng))[1]
+        assert bend.chances.sum() == pytest.approx(1.0)
+        means.append(float(bend.chances @ bend.size))
+        assert {*np.round(bend.size / bend.size.min(), 6)} == {
+            *np.round(SIZES / SIZES.min(), 6)
+        }
+    assert means[1] > 3.0 * means[0]
+
+
+def test_draws_have_the_moments_of_the_mixture_of_laws():
+    bend, at = fit_bends(curved()[2])[1], np.array([0.3, 0.6, 0.8])
+    rng, count = np.random.default_rng(5), 200_000
+    drawn = bend.draw(at, rng.random(count), rng.normal(size=count))
+    mean, sd = bend.law(at)
+    expected = bend.chances @ mean
+    square = bend.chances @ (mean**2 + sd**2)
+    np.testing.assert_allclose(drawn.mean(axis=0), expected, atol=0.02 * sd.max())
+    scatter = np.sqrt(square - expected**2)
+    np.testing.assert_allclose(drawn.std(axis=0), scatter, rtol=0.02)
+    one = bend.draw(at, np.array([0.5]), np.array([[0.0, 1.0, -1.0]]))
+    law = int(np.searchsorted(np.cumsum(bend.chances), 0.5))
+    np.testing.assert_allclose(one[0], mean[law] + sd[law] * [0.0, 1.0, -1.0])
+
+
+@pytest.mark.parametrize("make", slice_of([single, with_leftover], [with_leftover]))
+@pytest.mark.parametrize("at", [0.02, 0.28, 0.54])
+def test_there_is_no_step_at_the_ends_or_in_the_middle(make, at: float):
+    places = at + np.array([-1e-6, 0.0, 1e-6])
+    found = hdcal.predict(make(size=400), places)
+    for end in ENDS:
+        force = getattr(found, f"physics_{end}_N") - 205.0 * places
+        assert np.ptp(force) < 1e-3
+
+
+def test_bands_and_margin_agree():
+    posterior = single(size=1000)
+    for at in (0.3, 0.6, 0.8):
+        bands = hdcal.predict(posterior, [at])
+        force = hdcal.margin(posterior, at).worst.force_N
+        for end in ENDS:
+            found = getattr(bands, f"physics_{end}_N")[0]
+            assert found == pytest.approx(getattr(force, end), rel=1e-9)
+
+
+def width(posterior, at: float) -> float:
+    found = hdcal.margin(posterior, at).worst.force_N
+    return found.hi - found.lo
+
+
+def test_the_interval_is_wider_than_that_of_the_line_inside_and_more_beyond():
+    posterior = curved()[2]
+    draws = posterior.draws
+    more = []
+    for at in (0.27, 0.5, 0.7, 1.0):
+        line = draws["stiffness"] * at + draws["force_offset"]
+        low, high = np.quantile(line, [0.025, 0.975])
+        more.append(width(posterior, at) / (high - low))
+    assert all(share > 1.0 for share in more)
+    assert more[3] > more[2] > more[1] > 1.1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-200])
+def test_readings_without_noise_have_hardly_a_bend(noise: float):
+    x, rng = np.linspace(0.02, 0.54, 20), np.random.default_rng(8)
+    posterior = regressed(x, 200.0 * x, rng, 200, sigma=noise)
+    found = hdcal.predict(posterior, [0.3, 0.9])
+    np.testing.assert_allclose(found.physics_lo_N, [60.0, 180.0], atol=0.5)
+    np.testing.assert_allclose(found.physics_hi_N, [60.0, 180.0], atol=0.5)
+
+
+def test_an_outlier_is_no_bend():
+    """A model with outliers does not take one for curvature."""
+    x, rng = np.linspace(0.02, 0.54, 40), np.random.default_rng(5)
+    force = 200.0 * x + rng.normal(0.0, 0.3, 40)
+    force[-2] += 12.0
+    known = {"outliers__fraction": 0.05, "outliers__ratio": 20.0, "sigma": 0.3}
+    bent = width(regressed(x, force, rng), 0.9)
+    straight = width(regressed(x, force, rng, effects=["outliers"], **known), 0.9)
+    assert straight < 0.5 * bent
+
+
+def test_beyond_the_end_the_bend_replaces_a_fitted_leftover():
+    """Far beyond the end the leftover has no part; within the range only it has one."""
+    posterior = with_leftover(400)
+    shift = 10.0 / (1.0 + np.arange(20.0)) ** 2
+    moved = {"gap_weights": posterior.draws["gap_weights"] + shift}
+    other = written_posterior(ramp_case(), {**posterior.draws, **moved}, with_gap=True)
+    places = np.array([0.3, 0.54, 0.547, 0.54 + 3.0 * FADE * 0.52])
+    one, two = (hdcal.predict(p, places).with_gap_median_N for p in (posterior, other))
+    inside, end, just, far = np.abs(two - one)
+    assert min(inside, end) > 0.1 and 0.3 * end < just < end
+    assert far < 1e-3 * end

@@ -1,0 +1,228 @@
+"""Mirrored data and a mirrored request have the mirrored answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mirrored import check_same, mirrored
+from posteriors import (
+    batch,
+    plain_draws,
+    ramp_case,
+    single,
+    stiffer,
+    with_leftover,
+    written_posterior,
+)
+from rigs import make_gear
+from slices import slice_of
+
+import hdcal
+from hdcal.errors import InputError
+from hdcal.prediction.bands.predict import default_bands
+
+SIZE = 200
+
+
+def looped(size: int = SIZE, **sizes: float):
+    """Return one gear, loaded and unloaded, with effects of these parameters."""
+    case = ramp_case(known={"unloading", "temperature"}, sense=np.tile([1.0, -1.0], 15))
+    given = {name.replace("__", "."): np.full(size, v) for name, v in sizes.items()}
+    effects = dict.fromkeys(name.partition(".")[0] for name in given)
+    return written_posterior(case, plain_draws(case, size) | given, effects=effects)
+
+
+def friction():
+    loop = {"hysteresis__force": 4.0, "hysteresis__reach": 0.05}
+    return looped(coulomb_friction__force=2.0, **loop)
+
+
+def two_models():
+    gears = batch(6, SIZE)
+    return [(3.0, gears), (1.0, stiffer(gears, 1.1))]
+
+
+def opposite(value):
+    return None if value is None else -value
+
+
+# Signed numbers, and pairs of numbers that change place and sign.
+SIGNED = ("deformation_mm", "estimate_N", "loading_sense", "force_N", "median_mm")
+SWAPPED = (
+    ("lower_bound_N", "upper_bound_N"),
+    ("lo_mm", "hi_mm"),
+    ("lower_bound_mm", "upper_bound_mm"),
+)
+# Inputs that do not change their sign with the loading, where the force does.
+UNSIGNED = ("1", "1/K", "K")
+
+
+def turned(answer):
+    """Return the JSON answer with the other sign of deformations and forces."""
+    if isinstance(answer, list):
+        return [turned(each) for each in answer]
+    if not isinstance(answer, dict):
+        return answer
+    if answer.keys() == {"median", "lo", "hi"}:
+        ends = {"lo": -answer["hi"], "hi": -answer["lo"]}
+        return {"median": -answer["median"], **ends}
+    found = {name: turned(value) for name, value in answer.items()}
+    for name in SIGNED:
+        if isinstance(found.get(name), float | int):
+            found[name] = -found[name]
+    for one, other in SWAPPED:
+        if one in found:
+            pair = opposite(found[other]), opposite(found[one])
+            found[one], found[other] = pair
+    if "searched_mm" in found:
+        found["searched_mm"] = [-end for end in found["searched_mm"][::-1]]
+    if found.get("unit") in UNSIGNED:
+        found["sensitivity_N_per_unit"] *= -1.0
+    return found
+
+
+def mirror(models):
+    if isinstance(models, list):
+        return [(share, mirrored(model)) for share, model in models]
+    return mirrored(models)
+
+
+AT = {"deformation": 0.4, "limit_force": 84.0}
+WARM = {"temperature": [-20.0, 20.0, 80.0]}
+ASKED = {
+    "readings": (lambda: single(size=SIZE), AT | WARM | {"given_force": 80.0}),
+    "rounded": (lambda: single(make_gear(resolution=0.98), SIZE), AT),
+    "load": (lambda: single(size=SIZE), AT | {"quantity": "load", "limit_force": 82.0}),
+    "beyond": (
+        lambda: single(size=SIZE),
+        AT | {"deformation": 0.7, "limit_force": 142.0},
+    ),
+    "tolerances": (
+        lambda: single(size=SIZE),
+        AT | {"tolerances": {"wall_thickness_mm": 0.02}},
+    ),
+    "mountings": (lambda: batch(6, SIZE), AT | {"population": "mountings"}),
+    "specimens": (lambda: batch(6, SIZE), AT | WARM | {"given_force": 80.0}),
+    "averaged": (two_models, AT | {"given_force": 80.0}),
+    "leftover": (
+        lambda: with_leftover(SIZE),
+        AT | {"deformation": 0.58, "limit_force": 118.0},
+    ),
+    "stiffening": (
+        lambda: looped(progressive_stiffening__slope=0.4),
+        AT | {"given_force": 80.0, "limit_force": 94.0},
+    ),
+    "loading": (friction, AT | {"given_force": 80.0}),
+    "unloading": (friction, AT | {"direction": "down", "given_force": 80.0}),
+    "drifting zero": (lambda: looped(thermal_zero_drift__slope=0.1), AT | WARM),
+}
+QUICK = ("rounded", "specimens", "averaged", "leftover", "unloading")
+
+
+@pytest.mark.parametrize("name", slice_of(ASKED, QUICK))
+def test_the_margin_is_mirrored(name: str):
+    make, asked = ASKED[name]
+    models, other = make(), asked | {"deformation": -asked["deformation"]}
+    if "given_force" in asked:
+        other["given_force"] = -asked["given_force"]
+    found = hdcal.margin(models, **asked)
+    pulled = hdcal.margin(mirror(models), **other)
+    assert (found.loading_sense, pulled.loading_sense) == (1, -1)
+    assert pulled.worst.lower_bound_N < pulled.worst.upper_bound_N < 0.0
+    assert found.worst.capacity_N > 0.0 and found.worst.exceedance.probability > 0.0
+    expected, given = turned(found.to_dict()), pulled.to_dict()
+    check_same(given, expected)
+    if "given_force" in asked:
+        assert pulled.reached.lower_bound_mm < pulled.reached.upper_bound_mm < 0.0
+
+
+def test_a_capacity_is_a_size_or_has_the_sign_of_the_force():
+    pressed = single(size=SIZE)
+    pulled = mirrored(pressed)
+    size, signed = (
+        hdcal.margin(pulled, -0.4, limit_force=limit) for limit in (70.0, -70.0)
+    )
+    assert size.to_dict() == signed.to_dict() and size.limit_force_N == 70.0
+    assert size.worst.exceedance.probability > 0.999
+    with pytest.raises(InputError) as refused:
+        hdcal.margin(pressed, 0.4, limit_force=-70.0)
+    assert [finding.where for finding in refused.value.findings] == ["limit_force"]
+
+
+def test_a_force_is_reached_on_its_side_whatever_else_is_asked():
+    """Data of both directions of loading."""
+    case = ramp_case()
+    records = replace(
+        case.records,
+        deformation=np.linspace(-0.54, 0.54, 30),
+        force=205.0 * np.linspace(-0.54, 0.54, 30),
+        sense=np.tile([1.0, -1.0], 15),
+    )
+    both = written_posterior(replace(case, records=records), plain_draws(case, SIZE))
+    across = hdcal.margin(both, 0.4, given_force=-80.0).reached
+    own = hdcal.margin(both, -0.4, given_force=-80.0).reached
+    for name in ("median_mm", "lower_bound_mm", "upper_bound_mm"):
+        assert getattr(across, name) == pytest.approx(getattr(own, name), rel=1e-3)
+    assert own.tested and own.lower_bound_mm < own.median_mm < own.upper_bound_mm < -0.3
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_loading_is_that_of_the_gear_and_not_of_the_gauge(sign: int):
+    """Where the unloaded gear reads 0.1 mm, a reading of 0.05 mm pulls it."""
+    posterior = single(size=SIZE)
+    shifted = {
+        **posterior.draws,
+        "deformation_offset": posterior.draws["deformation_offset"] + 0.1,
+    }
+    posterior = written_posterior(posterior.case, shifted)
+    posterior = posterior if sign > 0 else mirrored(posterior)
+    senses = [hdcal.margin(posterior, sign * at).loading_sense for at in (0.05, 0.15)]
+    assert senses == [-sign, sign]
+
+
+# --- bands ---
+
+ENDS = (("lo", "hi"), ("median", "median"), ("hi", "lo"))
+TURNED = {"up": "down", "down": "up"}
+
+
+def check_mirrored(other, found, rows=slice(None)) -> None:
+    """Require bands to be those of mirrored data, the rows in a given order."""
+    np.testing.assert_allclose(other.deformation_mm[rows], -found.deformation_mm)
+    assert [TURNED[way] for way in other.direction[rows]] == found.direction.tolist()
+    assert np.array_equal(other.tested[rows], found.tested)
+    for kind in ("physics", "with_gap"):
+        for end, source in ENDS:
+            got = getattr(other, f"{kind}_{end}_N")[rows]
+            expected = -getattr(found, f"{kind}_{source}_N")
+            np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9)
+    new = other.new_measurement_median_N[rows] + found.new_measurement_median_N
+    width = found.new_measurement_hi_N - found.new_measurement_lo_N
+    assert np.all(np.abs(new) < 0.1 * width)
+
+
+@pytest.mark.parametrize("way", TURNED)
+@pytest.mark.parametrize("make", [friction, lambda: with_leftover(SIZE)])
+def test_the_bands_are_mirrored(make, way: str):
+    known, at = make(), np.array([-0.1, 0.1, 0.4, 0.6])
+    found = hdcal.predict(known, at, [20.0, 60.0], way)
+    other = hdcal.predict(mirrored(known), -at, [20.0, 60.0], TURNED[way])
+    check_mirrored(other, found)
+    loaded = 1.0 if way == "up" else -1.0
+    assert found.tested.any() == (loaded in known.case.records.sense)
+
+
+def test_by_default_the_gear_is_loaded():
+    known, at = friction(), np.array([0.0, 0.1, 0.4])
+    found, other = hdcal.predict(known, at), hdcal.predict(mirrored(known), -at)
+    assert {*found.direction} == {"up"} and {*other.direction} == {"down"}
+    check_mirrored(other, found)
+
+
+def test_the_grid_of_a_result_folder_is_mirrored():
+    known = with_leftover(SIZE)
+    gear = replace(known.case.gear, nominal_deformation=None)
+    known = replace(known, case=replace(known.case, gear=gear))
+    found, other = default_bands(known), default_bands(mirrored(known))
+    assert other.deformation_mm.min() < -0.54 and other.deformation_mm.max() == 0.0
+    check_mirrored(other, found, slice(None, None, -1))
