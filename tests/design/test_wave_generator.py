@@ -64,18 +64,19 @@ def test_the_probability_is_that_of_normal_gears(rate):
     draws, gears = 200_000, norm(200.0, 10.0)
     spring = judge(rate, straight(gears.rvs(draws, random_state=0)))
     # ω ≥ lo ⇔ s ≤ c (x − lo)/lo, ω ≤ hi ⇔ s ≥ c (x − hi)/hi.
-    most, least = (rate * (spring.x - end) / end for end in WINDOW)
+    x = spring.interference_mm
+    most, least = (rate * (x - end) / end for end in WINDOW)
     true = gears.cdf(most) - gears.cdf(least)
     error = np.sqrt(true * (1.0 - true) / draws)
-    assert spring.inside == pytest.approx(true, abs=4.0 * error + 1e-12)
-    assert spring.no_backlash == pytest.approx(gears.cdf(most), abs=4e-3)
-    others = spring.x + np.linspace(-0.2, 0.2, 401) * (0.04 + 20.0 / rate)
+    assert spring.probability == pytest.approx(true, abs=4.0 * error + 1e-12)
+    assert spring.zero_backlash == pytest.approx(gears.cdf(most), abs=4e-3)
+    others = x + np.linspace(-0.2, 0.2, 401) * (0.04 + 20.0 / rate)
     ends = (gears.cdf(rate * (others / end - 1.0)) for end in WINDOW)
     assert np.max(next(ends) - next(ends)) <= true + 3e-3
     if rate == 0.01:  # force control: one force for all gears
         assert true == pytest.approx(0.682, abs=0.01)
     if rate == 1e5:  # displacement control
-        assert spring.inside == 1.0
+        assert spring.probability == 1.0
 
 
 @pytest.mark.parametrize("draws", [4000, 40])
@@ -83,8 +84,8 @@ def test_choosing_on_the_same_draws_has_little_bias_if_they_are_many(draws):
     gears, gaps = norm(200.0, 10.0), []
     for seed in range(40):
         spring = judge(100.0, straight(gears.rvs(draws, random_state=seed)))
-        most, least = (100.0 * (spring.x / end - 1.0) for end in WINDOW)
-        gaps.append(spring.inside - (gears.cdf(most) - gears.cdf(least)))
+        most, least = (100.0 * (spring.interference_mm / end - 1.0) for end in WINDOW)
+        gaps.append(spring.probability - (gears.cdf(most) - gears.cdf(least)))
     assert (np.mean(gaps) < np.sqrt(0.8 * 0.2 / 4000)) == (draws == 4000)
 
 
@@ -113,12 +114,10 @@ def test_with_an_error_of_the_set_point_there_is_a_best_rate():
     assert shares[-1] < max(shares) - 0.02
 
 
-def test_correlated_draws_have_a_larger_standard_error():
+def test_correlated_draws_are_less_certain():
     gears = replace(known(), independent=1200.0)
     found = wave_generator(gears, WINDOW, probability=0.99)
-    share, error = found.spring.probability, found.spring.standard_error
-    assert error == pytest.approx(np.sqrt(share * (1.0 - share) / 1200.0))
-    assert found.at_reference.no_jam <= 1.0 - 0.5 / 1200.0
+    assert found.at_reference.no_jam == 1.0 - 0.5 / 1200.0
     with pytest.raises(InputError, match="from 1200 independent"):
         wave_generator(gears, WINDOW, probability=0.993)
 

@@ -70,7 +70,7 @@ def balance_chart(found: "WaveGenerator") -> Chart:
     low, high = asked.window_mm
     x = np.linspace(low - 1.5 * (high - low), high + 1.5 * (high - low), _FINE)
     x, gears = x[sense * x > 0.0], found.source
-    factor = gears.factor({}).reshape(-1, 1)
+    factor = gears.factor({})
     marks: list[Mark] = [
         Span(low=low, high=high, axis="x", label="window", colour=GREEN)
     ]
@@ -117,7 +117,7 @@ def study_chart(found: "Study") -> Chart:
     There is a curve for each combination of what else was varied; of more than six only
     some. Materials alone have a point each.
     """
-    columns = found.designs
+    columns = {name: np.array(each) for name, each in found.designs.items()}
     forces = np.stack([columns[f"force_{end}_N"] for end in ("lo", "median", "hi")])
     kind = found.interval_kind.removeprefix("equal-tailed ")
     title, y = f"Median and {100.0 * found.interval:g} % {kind}", "force [N]"

@@ -47,12 +47,13 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
         remedy = "Name a folder of hdcal calibrate, or `gear` GEAR.toml for priors only"
         console.wrong.append(Finding("run", words, remedy))
         return None
-    source = console.wrong.attempt(
-        load_models if gear is None else read_gear, run or gear
-    )
+    if gear is not None:
+        source, name = console.wrong.attempt(read_gear, gear), Path(gear).stem
+    else:
+        source = console.wrong.attempt(load_models, run)
+        name = "" if source is None else source.case.name
     if source is not None:
-        stem = Path(gear).stem if gear else source.case.name
-        console.reserve_folder(out or f"{stem}-{kind}", force)
+        console.reserve_folder(out or f"{name}-{kind}", force)
     return source
 
 

@@ -1,5 +1,6 @@
 """The force on gears, draw by draw: everything that designs take from the simulator."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ class CalibratedGear:
 
     case: Case
     theory: Theory
-    values: dict[str, np.ndarray]
+    values: Mapping[str, np.ndarray]
     independent: float
     notes: tuple[str, ...]
     problem: Problem
@@ -55,7 +56,7 @@ class CalibratedGear:
         return cls(
             case=pooled.case,
             theory=pooled.theory,
-            values=values,
+            values={name: np.asarray(draws) for name, draws in values.items()},
             independent=min(jointly_worth(pooled.causes), len(values["K"])),
             notes=(*averaging_words(pooled.causes), *misfit),
             problem=pooled.problem,

@@ -23,7 +23,7 @@ from hdcal.design.gear_forces import (
     Models,
     stiffness_ratio,
 )
-from hdcal.errors import Finding, Findings
+from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
 from hdcal.physics.profile import peak_stress
 from hdcal.physics.theory import THEORIES
@@ -55,7 +55,7 @@ class Gears:
     theory: Theory
     material: str
     facts: dict[str, Prior]
-    values: dict[str, np.ndarray]
+    values: Mapping[str, np.ndarray]
     independent: float
     model: CalibratedGear | None = None
     sense: int = 1
@@ -89,10 +89,16 @@ class Gears:
         shifted = {n: nominal[n] + by for n, by in self.shifts.items()}
         return self.drawing({**sizes, **shifted})
 
+    @property
+    def scatters(self) -> bool:
+        """Whether the gears differ from each other."""
+        return bool(self.shifts) or bool(np.any(self.deviation))
+
     def factor(self, sizes: Sizes) -> np.ndarray:
-        """Return the stiffness over that of the tested gear [-], broadcast to draws."""
+        """Return the stiffness over that of the tested gear [-] for `forces`."""
         ratio = stiffness_ratio(self.made(sizes), self.gear.geometry, self.theory)
-        return np.asarray(ratio * (1.0 + self.deviation))
+        factor = np.asarray(ratio * (1.0 + self.deviation))
+        return factor[:, None] if self.scatters else factor
 
     def forces(self, deformation: Any, temperature: Any, factor: Any = 1.0):
         """Return the force on each gear [N], shape (n, draw).
@@ -100,7 +106,7 @@ class Gears:
         Args:
             deformation: radial, from the free shape [mm], shape (n,).
             temperature: of the gear [°C], shape (n,).
-            factor: from `factor`, or for each row, broadcast to (draw, n).
+            factor: stiffness over that of the tested gear [-], broadcast to (draw, n).
         """
         at, warm = self.sense * np.asarray(deformation), np.asarray(temperature)
         factor, values = np.broadcast_to(factor, (self.size, len(at))), self.values
@@ -111,9 +117,7 @@ class Gears:
         stiffness = values["K"] * values["E0"] * unit * (1.0 - loss) * factor.T
         return self.sense * stiffness * at[:, None]
 
-    def stresses(
-        self, sizes: Sizes, deformation: float, temperature: Any
-    ) -> np.ndarray:
+    def stresses(self, sizes: Sizes, deformation: float, temperature: Any):
         """Return the largest hoop bending stress over temperatures [MPa], (draw,)."""
         rise = np.asarray(temperature) - self.gear.reference_temperature
         warm = np.max(1.0 - self.values["alpha"][:, None] * rise, axis=1)
@@ -125,9 +129,7 @@ class Gears:
         prior, rng = self.facts.get("yield_strength"), np.random.default_rng(self.size)
         return prior and sample_prior(prior, "yield_strength", rng, self.size)
 
-    def next_ones(
-        self, tolerances: Mapping[str, float], seed: int, sense: int
-    ) -> "Gears":
+    def next_ones(self, tolerances: Mapping, seed: int, sense: int) -> "Gears":
         """Draw the gears that a design has to fit.
 
         Args:
@@ -173,26 +175,24 @@ def draw_gears(given: Models | Gear | Gears, seed: int = 0, count: int = 4000) -
     """
     if isinstance(given, Gears):
         return given
-    with Findings() as wrong:
-        wrong += implausible("seed", seed)
-        model = None if isinstance(given, Gear) else CalibratedGear.of(given, seed)
-        known = model or given
-        if known.theory == SPRING:
-            words = "has no sizes, and a design changes sizes"
-            remedy = "Calibrate with the sizes of the gear and another theory"
-            wrong.append(Finding(f"theory '{SPRING}'", words, remedy))
-    gear = given if model is None else model.case.gear
+    if wrong := implausible("seed", seed):
+        raise InputError(wrong)
+    if isinstance(given, Gear):
+        gear, theory, model = given, given.theory, None
+    else:
+        model = CalibratedGear.of(given, seed)
+        gear, theory = model.case.gear, model.theory
+    if theory == SPRING:
+        words = "has no sizes, and a design changes sizes"
+        remedy = "Calibrate with the sizes of the gear and another theory"
+        raise InputError([Finding(f"theory '{SPRING}'", words, remedy)])
     # The material file of a user may have moved since; only its yield strength would
     # be used.
     shipped = gear.material in material_names()
     facts = material_priors(gear.material) if shipped else {}
-    values, independent = {}, float(count)
+    own = gear, theory, gear.material, facts
     if model is not None:
-        values, independent = model.values, model.independent
-    else:
-        rng = np.random.default_rng(seed)
-        for name, prior in gear.priors.items():
-            values[name] = sample_prior(prior, name, rng, count)
-    values = {name: np.asarray(draws) for name, draws in values.items()}
-    own = gear, known.theory, gear.material, facts
-    return Gears(*own, values, independent, model)
+        return Gears(*own, model.values, model.independent, model)
+    rng, priors = np.random.default_rng(seed), gear.priors.items()
+    values = {name: sample_prior(prior, name, rng, count) for name, prior in priors}
+    return Gears(*own, values, count)

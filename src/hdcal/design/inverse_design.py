@@ -18,18 +18,12 @@ from pydantic import Field, InstanceOf, ValidationInfo, field_validator
 
 from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import fault, requested, within
-from hdcal.design import result
+from hdcal.design import request
 from hdcal.design.charts import limit_chart
 from hdcal.design.gear_forces import Models
 from hdcal.design.gears import Gears, Sizes, draw_gears
 from hdcal.design.nearest_point import CLOSE, nearest_kept
-from hdcal.design.request import (
-    Asked,
-    Bounds,
-    NominalDeformation,
-    SizeName,
-    check_sizes,
-)
+from hdcal.design.result import DesignResult, Stress, shared_fields
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Interval, Probability, quantity
@@ -41,7 +35,7 @@ Force = Annotated[float, within("force")]
 Strength = Annotated[float, within("limit_stress")]
 
 
-class LimitAsked(Asked):
+class LimitAsked(request.Asked):
     """The request for an inverse design.
 
     Attributes:
@@ -51,10 +45,10 @@ class LimitAsked(Asked):
         bounds: of each free size [mm] by name.
     """
 
-    deformation_mm: NominalDeformation = Field(validation_alias="deformation")
+    deformation_mm: request.NominalDeformation = Field(validation_alias="deformation")
     limit_force_N: Force = Field(validation_alias="limit_force")
     limit_stress_MPa: Strength | None = Field(validation_alias="limit_stress")
-    bounds: dict[SizeName, Bounds] = Field(validation_alias="vary")
+    bounds: dict[request.SizeName, request.Bounds] = Field(validation_alias="vary")
 
     @property
     def sense(self) -> int:
@@ -64,8 +58,8 @@ class LimitAsked(Asked):
     @field_validator("limit_force_N")
     @classmethod
     def _check_limit(cls, limit: float, info: ValidationInfo) -> float:
-        draws, at = info.context, info.data.get("deformation_mm", 0.0)
-        usual = abs(np.median(draws.forces([at], [draws.gear.reference_temperature])))
+        gears, at = request.gears_of(info), info.data.get("deformation_mm", 0.0)
+        usual = abs(np.median(gears.forces([at], [gears.gear.reference_temperature])))
         if limit < 0.0 < at or not usual / _OFF <= abs(limit) <= usual * _OFF:
             words = f"{limit:g} N is no limit where {at:g} mm takes about {usual:.3g} N"
             raise fault(words, "Give it in N, with the sign of the deformation")
@@ -74,11 +68,12 @@ class LimitAsked(Asked):
     @field_validator("bounds")
     @classmethod
     def _check_bounds(cls, bounds: dict, info: ValidationInfo) -> dict:
-        check_sizes(info.context, bounds, info.data.get("deformation_mm", 0.0))
+        at = info.data.get("deformation_mm", 0.0)
+        request.check_sizes(request.gears_of(info), bounds, at)
         return bounds
 
 
-class Candidate(result.Stress):
+class Candidate(Stress):
     """One material with the sizes that were found best for it.
 
     Attributes:
@@ -96,7 +91,6 @@ class Candidate(result.Stress):
     force_N: Interval = quantity("force", "N")
     force_kept_N: float = quantity("force kept", "N")
     probability: Probability = quantity("probability of keeping the limit")
-    standard_error: float = quantity("standard error of the probability")
     utilisation_kept: float | None = quantity("share of the allowed stress kept")
 
     @property
@@ -119,7 +113,7 @@ class LimitedGears:
     def forces(self, sizes: Sizes) -> np.ndarray:
         """Return the largest force over the temperatures of each draw [N]."""
         levels, at = self.asked.temperature_C, abs(self.asked.deformation_mm)
-        factor = self.gears.factor(sizes).reshape(-1, 1)
+        factor = self.gears.factor(sizes)
         return self.gears.forces([at] * len(levels), levels, factor).max(axis=0)
 
     def stresses(self, sizes: Sizes) -> tuple[np.ndarray, np.ndarray | None]:
@@ -136,49 +130,43 @@ class LimitedGears:
 
     def excess(self, sizes: Sizes) -> np.ndarray:
         """Return logarithms of the kept force and stress over what is allowed."""
-        shares, (_, used) = (
-            [self.forces(sizes) / self.asked.limit_force_N],
-            self.stresses(sizes),
-        )
-        return np.log(
-            [self.kept(share) for share in (*shares, used) if share is not None]
-        )
+        force = self.kept(self.forces(sizes)) / self.asked.limit_force_N
+        _, used = self.stresses(sizes)
+        return np.log([force] if used is None else [force, self.kept(used)])
 
     def candidate(self, sizes: Mapping[str, float]) -> Candidate:
         """Return force, stress and probability of given sizes [mm]."""
-        gears, sense = self.gears, self.asked.sense
+        gears, sense, least = self.gears, self.asked.sense, 0.5 / self.gears.independent
         forces, (stress, used) = self.forces(sizes), self.stresses(sizes)
         steps = [np.log(value / gears.size_of(name)) for name, value in sizes.items()]
-        limit = self.asked.limit_force_N * (1.0 + CLOSE)
-        probability, error = result.counted(float(np.mean(forces <= limit)), gears)
+        kept = forces <= self.asked.limit_force_N * (1.0 + CLOSE)
         return Candidate(
-            **result.stress_fields(gears, stress),
+            **dict(Stress.of(gears, stress)),
             material=gears.material,
             sizes_mm={name.removesuffix("_mm"): value for name, value in sizes.items()},
             met=bool(np.max(self.excess(sizes)) <= CLOSE),
             change=float(np.linalg.norm(steps)),
             force_N=Interval.of(sense * forces),
             force_kept_N=sense * self.kept(forces),
-            probability=probability,
-            standard_error=error,
+            probability=float(np.clip(np.mean(kept), least, 1.0 - least)),
             utilisation_kept=None if used is None else self.kept(used),
         )
 
     def best(self) -> Candidate:
         """Return the sizes that keep the limits with the least change."""
-        names = tuple(self.asked.bounds)
+        names, bounds = [*self.asked.bounds], [*self.asked.bounds.values()]
 
         def sizes(logs: np.ndarray) -> dict[str, float]:
             return dict(zip(names, map(float, np.exp(logs)), strict=True))
 
         start = np.log([self.gears.size_of(name) for name in names])
         if names:
-            ends = np.log([self.asked.bounds[name] for name in names])
-            start = nearest_kept(lambda logs: self.excess(sizes(logs)), start, ends)
+            bounds = np.log(bounds)
+            start = nearest_kept(lambda y: self.excess(sizes(y)), start, bounds)
         return self.candidate(sizes(start))
 
 
-class InverseDesign(result.DesignResult):
+class InverseDesign(DesignResult):
     """The sizes that keep the limits with the least change.
 
     Attributes:
@@ -266,7 +254,7 @@ def inverse_design(
     design, target = min(kept, key=lambda pair: pair[0].change)
     place = asked.deformation_mm, asked.temperature_C, design.sizes
     return InverseDesign(
-        **result.shared_fields(own.gears, *place),
+        **shared_fields(own.gears, *place),
         materials=(design.material,),
         asked=asked,
         design=design,
@@ -277,17 +265,10 @@ def inverse_design(
 
 
 def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
-    limit = asked.limit_force_N
-    best = min(
-        found,
-        key=lambda one: max(abs(one.force_kept_N) / limit, one.utilisation_kept or 0.0),
-    )
+    best = min(found, key=lambda one: abs(one.force_kept_N))
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
-    words = (
-        f"nothing keeps {limit:g} N with probability {asked.probability:g}: the best "
-    )
-    words += f"({at or best.material}) gives {best.force_kept_N:.4g} N"
-    if best.utilisation_kept is not None:
-        words += f" and {best.utilisation_kept:.3g} of the allowed stress"
-    remedy = "Widen the bounds, free another size, or allow more force"
+    words = f"nothing keeps {asked.limit_force_N:g} N with probability "
+    words += f"{asked.probability:g}: the best ({at or best.material}) gives "
+    words += f"{best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
+    remedy = "Widen the bounds, free another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

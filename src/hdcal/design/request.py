@@ -17,38 +17,41 @@ _MOST_LOSS = 0.5
 _LEAST_OUTSIDE = 10
 
 
+def gears_of(info: ValidationInfo) -> Gears:
+    """Return the gears for which a request is validated."""
+    gears: Any = info.context
+    return gears
+
+
 def _nominal(given: Any, info: ValidationInfo) -> Any:
-    nominal = info.context.gear.nominal_deformation
-    if given is None and nominal is None:
+    nominal = gears_of(info).gear.nominal_deformation
+    if given is not None:
+        return given
+    if nominal is None:
         words = "the gear file names no nominal deformation"
         raise fault(words, "Give one in mm, such as 0.4")
     # The gear file states it as read.
-    return nominal * info.context.radial_per_read if given is None else given
-
-
-def _not_zero(deformation: float) -> float:
-    if deformation == 0.0:
-        raise fault("a deformation that is zero", "Give it in mm")
-    return deformation
+    return nominal * gears_of(info).radial_per_read
 
 
 def _possible(temperature: float, info: ValidationInfo) -> float:
-    rise = abs(temperature - info.context.gear.reference_temperature)
-    if np.median(info.context.values["alpha"]) * rise >= _MOST_LOSS:
+    gears = gears_of(info)
+    rise = abs(temperature - gears.gear.reference_temperature)
+    if np.median(gears.values["alpha"]) * rise >= _MOST_LOSS:
         words = "the linear change of E with T would lose half of Young's modulus"
         raise fault(words, "Give it in °C")
     return temperature
 
 
 def _with_reference(given: Any, info: ValidationInfo) -> list[float]:
-    reference = info.context.gear.reference_temperature
+    reference = gears_of(info).gear.reference_temperature
     levels = [reference] if given is None or not len(given) else list(given)
     inside = min(levels) < reference < max(levels)
     return sorted({*map(float, levels), *([reference] if inside else [])})
 
 
 def _countable(probability: float, info: ValidationInfo) -> float:
-    size = info.context.independent
+    size = gears_of(info).independent
     if (1.0 - probability) * size < _LEAST_OUTSIDE * (1.0 - 1e-9):
         words = f"{probability:g} cannot be estimated from {size:.0f} independent draws"
         most = 1.0 - _LEAST_OUTSIDE / size
@@ -58,7 +61,7 @@ def _countable(probability: float, info: ValidationInfo) -> float:
 
 def _of_sizes(tolerances: dict, info: ValidationInfo) -> dict:
     for name, width in tolerances.items():
-        size = info.context.size_of(name)
+        size = gears_of(info).size_of(name)
         if not 0.0 < width < 0.5 * size:
             words = f"{name} = {width:g} is no tolerance of {size:g} mm"
             raise fault(words, "Give the ± part in mm, such as 0.02")
@@ -74,12 +77,12 @@ def ascending(ends: tuple[float, float]) -> tuple[float, float]:
 
 SizeName = Literal["wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm"]
 Size = Annotated[float, within("size")]
-# Radial, of the gear itself [mm].
-Deformation = Annotated[float, within("deformation"), AfterValidator(_not_zero)]
-NominalDeformation = Annotated[Deformation, BeforeValidator(_nominal)]
-Temperature = Annotated[float, within("temperature"), AfterValidator(_possible)]
 Bounds = Annotated[tuple[Size, Size], AfterValidator(ascending)]
+# Radial, of the gear itself [mm].
+Deformation = Annotated[float, within("deformation")]
+NominalDeformation = Annotated[Deformation, BeforeValidator(_nominal)]
 Window = Annotated[tuple[Deformation, Deformation], AfterValidator(ascending)]
+Temperature = Annotated[float, within("temperature"), AfterValidator(_possible)]
 _Levels = Annotated[
     tuple[Temperature, ...], BeforeValidator(_with_reference), Field(max_length=1000)
 ]
@@ -102,7 +105,7 @@ class Asked(Item):
     tolerances_mm: _Tolerances = Field(validation_alias="tolerances")
 
 
-def check_sizes(gears: Gears, sizes: Mapping[str, Any], deformation: Any) -> None:
+def check_sizes(gears: Gears, sizes: Mapping[Any, Any], deformation: Any) -> None:
     """Require sizes [mm], by name, that are possible in every combination.
 
     Raises:

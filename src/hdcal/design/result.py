@@ -22,9 +22,21 @@ class Stress(Item):
     yield_MPa: Interval | None = quantity("yield strength", "MPa")
     utilisation: Interval | None = quantity("share of the yield strength")
 
+    @classmethod
+    def of(cls, gears: Gears, stress: np.ndarray) -> "Stress":
+        """Return the intervals of the stress of each draw [MPa]."""
+        strength, size = gears.strengths(), Interval.of(stress)
+        if strength is None:
+            return cls(stress_MPa=size, yield_MPa=None, utilisation=None)
+        share = Interval.of(stress / strength)
+        return cls(stress_MPa=size, yield_MPa=Interval.of(strength), utilisation=share)
+
 
 class DesignResult(Result):
     """What the results of designs and studies share.
+
+    Probabilities are counted among draws; all of these do not make it certain, half of
+    an independent draw remains uncertain.
 
     Attributes:
         source: the gear that is to be changed, for each draw.
@@ -42,7 +54,8 @@ class DesignResult(Result):
     gear: dict[str, str]
     basis: Literal["posterior", "prior"]
     draws: int
-    interval: float = Field(default=INTERVAL, gt=0.0, lt=1.0)
+    independent_draws: float
+    interval: float
     interval_kind: Words
 
     @computed_field
@@ -71,7 +84,11 @@ class DesignResult(Result):
 
 
 def shared_fields(
-    gears: Gears, deformation: Any, temperature: Any, sizes: Mapping[str, Any]
+    gears: Gears,
+    deformation: Any,
+    temperature: Any,
+    sizes: Mapping[Any, Any],
+    interval: float = INTERVAL,
 ) -> dict[str, Any]:
     """Return the fields of every design.
 
@@ -80,12 +97,13 @@ def shared_fields(
         deformation: radial, of any sign [mm].
         temperature: [°C].
         sizes: that differ from the tested gear's [mm], by name.
+        interval: probability inside the intervals.
     """
-    scatter = gears.shifts or np.any(gears.deviation)
-    kind, untested, far = "predictive" if scatter else "credible", {}, {}
-    if gears.model is None:
-        kind = "prior predictive" if scatter else "prior"
-    else:
+    prior, untested, far = gears.model is None, {}, {}
+    kind = "prior" if prior else "credible"
+    if gears.scatters:
+        kind = "prior predictive" if prior else "predictive"
+    if gears.model is not None:
         records = gears.model.case.records
         radial = np.asarray(records.deformation) * gears.radial_per_read
         for name, asked, tested, near in (
@@ -93,45 +111,23 @@ def shared_fields(
             # Thermometers are no better than 1 K.
             ("temperature", temperature, records.temperature, 1.0),
         ):
-            (low, high), ends = _ends(asked), _ends(tested)
-            if low < ends[0] - near or high > ends[1] + near:
-                untested[name] = (low, high), ends
+            ends = [float(f(v)) for v in (asked, tested) for f in (np.min, np.max)]
+            if ends[0] < ends[2] - near or ends[1] > ends[3] + near:
+                untested[name] = ends[:2], ends[2:]
     for name, values in sizes.items():
-        value = max(
-            np.ravel(values), key=lambda v: abs(np.log(v / gears.size_of(name)))
-        )
-        if abs(np.log(value / gears.size_of(name))) > np.log(_FAR_SIZE):
-            far[name] = float(value)
+        ratios = np.ravel(values) / gears.size_of(name)
+        farthest = float(max(ratios, key=lambda ratio: abs(np.log(ratio))))
+        if abs(np.log(farthest)) > np.log(_FAR_SIZE):
+            far[name] = farthest * gears.size_of(name)
     gear = gears.gear
     return {
         "source": gears,
         "far_sizes": far,
         "untested": untested,
         "gear": {"name": gear.name, "material": gear.material, "theory": gears.theory},
-        "basis": "prior" if gears.model is None else "posterior",
+        "basis": "prior" if prior else "posterior",
         "draws": gears.size,
+        "independent_draws": gears.independent,
+        "interval": interval,
         "interval_kind": f"equal-tailed {kind} interval",
     }
-
-
-def _ends(values: Any) -> Ends:
-    return float(np.min(values)), float(np.max(values))
-
-
-def counted(share: float, gears: Gears) -> tuple[float, float]:
-    """Return a probability that was counted among draws, and its standard error.
-
-    All draws do not make it certain: half a draw remains uncertain.
-    """
-    size = gears.independent
-    share = float(np.clip(share, 0.5 / size, 1.0 - 0.5 / size))
-    return share, float(np.sqrt(share * (1.0 - share) / size))
-
-
-def stress_fields(gears: Gears, stress: np.ndarray) -> dict[str, Interval | None]:
-    """Return the fields of `Stress` from the stress of each draw [MPa]."""
-    fields, strength = {"stress_MPa": stress}, gears.strengths()
-    if strength is not None:
-        fields |= {"yield_MPa": strength, "utilisation": stress / strength}
-    names = Stress.model_fields
-    return {n: Interval.of(fields[n]) if n in fields else None for n in names}

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hdcal.report.item import Item, Probability, quantity
+
 # Number of rates, evenly spaced in their logarithm.
 _RATES = 61
 # Bisections between two of them: the rate is then known to 1 %.
@@ -30,6 +32,7 @@ class Gap(NamedTuple):
         force_low: of each gear at the least one [N], shape (temperature, draw).
         force_high: at the largest one.
         error: by which x comes out too large [mm], shape (draw,).
+        least: probability of what no draw shows.
     """
 
     low: float
@@ -37,16 +40,22 @@ class Gap(NamedTuple):
     force_low: np.ndarray
     force_high: np.ndarray
     error: np.ndarray
+    least: float = 0.0
 
 
-class Judged(NamedTuple):
-    """A set point x at a spring rate c, and the probabilities that it achieves."""
+class Kept(Item):
+    """Probabilities with one set point for every gear."""
 
-    rate: float
-    x: float
-    inside: float
-    no_backlash: float
-    no_jam: float
+    probability: Probability = quantity("probability inside the window")
+    zero_backlash: Probability = quantity("probability of no backlash")
+    no_jam: Probability = quantity("probability of no jam")
+
+
+class Spring(Kept):
+    """A spring rate c with its best set point x."""
+
+    rate_N_per_mm: float = quantity("spring rate", "N/mm")
+    interference_mm: float = quantity("set point", "mm")
 
 
 def set_points(rate: float, gap: Gap) -> np.ndarray:
@@ -79,17 +88,24 @@ def best_common(low: np.ndarray, high: np.ndarray) -> float:
     return float(0.5 * (edges[widest] + edges[widest + 1]))
 
 
-def judge(rate: float, gap: Gap, x: float | None = None) -> Judged:
-    """Return what a set point [mm] achieves at a rate [N/mm]; by default the best."""
+def kept_at(rate: float, x: float, gap: Gap) -> dict[str, float]:
+    """Return the probabilities that a set point [mm] achieves at a rate [N/mm]."""
     low, high = set_points(rate, gap)
-    x = best_common(low, high) if x is None else x
     above, below = x >= low, x <= high
-    return Judged(rate, x, *(float(np.mean(s)) for s in (above & below, above, below)))
+    kept = {"probability": above & below, "zero_backlash": above, "no_jam": below}
+    ends = gap.least, 1.0 - gap.least
+    return {name: float(np.clip(np.mean(each), *ends)) for name, each in kept.items()}
+
+
+def judge(rate: float, gap: Gap) -> Spring:
+    """Return the best common set point at a rate [N/mm]."""
+    x = best_common(*set_points(rate, gap))
+    return Spring(rate_N_per_mm=rate, interference_mm=x, **kept_at(rate, x, gap))
 
 
 def judge_all(
     rates: tuple[float, float], gap: Gap, required: float
-) -> tuple[list[Judged], Judged | None]:
+) -> tuple[list[Spring], Spring | None]:
     """Return springs of all rates [N/mm], and the softest with a probability or None.
 
     Args:
@@ -98,15 +114,15 @@ def judge_all(
         required: probability.
     """
     springs = [judge(float(rate), gap) for rate in np.geomspace(*rates, _RATES)]
-    row = next((r for r, one in enumerate(springs) if one.inside >= required), None)
-    if row is None:
+    met = [row for row, one in enumerate(springs) if one.probability >= required]
+    if not met:
         return springs, None
-    chosen, below = springs[row], springs[max(row - 1, 0)].rate
-    for _ in range(_HALVINGS if row else 0):
-        middle = judge(float(np.sqrt(below * chosen.rate)), gap)
+    chosen, below = springs[met[0]], springs[max(met[0] - 1, 0)].rate_N_per_mm
+    for _ in range(_HALVINGS if met[0] else 0):
+        middle = judge(float(np.sqrt(below * chosen.rate_N_per_mm)), gap)
         springs.append(middle)
-        if middle.inside >= required:
+        if middle.probability >= required:
             chosen = middle
         else:
-            below = middle.rate
-    return sorted(springs), chosen
+            below = middle.rate_N_per_mm
+    return sorted(springs, key=lambda one: one.rate_N_per_mm), chosen

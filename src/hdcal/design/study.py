@@ -1,58 +1,53 @@
 """A parameter study: the force on gears with every combination of some sizes."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import prod
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, ValidationInfo, computed_field, field_validator
+from pydantic import Field, InstanceOf, ValidationInfo, computed_field, field_validator
 
 from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import requested, within
+from hdcal.design import request
 from hdcal.design.charts import study_chart
-from hdcal.design.gear_forces import (
-    SIZES,
-    Models,
-)
+from hdcal.design.gear_forces import SIZES, Models
 from hdcal.design.gears import Gears, draw_gears
-from hdcal.design.request import (
-    NominalDeformation,
-    Size,
-    SizeName,
-    Temperature,
-    check_sizes,
-)
 from hdcal.design.result import DesignResult, shared_fields
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.physics.profile import peak_stress
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import Interval, Item
-from hdcal.report.markdown import MOST_ROWS
+from hdcal.report.item import Item
 
-PLACE = "deformation_mm", "temperature_C"
+PLACE = ["deformation_mm", "temperature_C"]
 AXES = (*SIZES, *PLACE)
 MOST_DESIGNS = 100_000
 # Forces held at a time [numbers]: 16 MB.
 _BLOCK = 2_000_000
-_FORCES = ("force_median_N", "force_lo_N", "force_hi_N")
-_COLUMNS = ("material", *_FORCES, "stress_MPa")
+_FORCES = ["force_median_N", "force_lo_N", "force_hi_N"]
+
+Deformations = tuple[request.NominalDeformation, ...]
 
 
 class StudyAsked(Item):
     """The request for a study: values of sizes, deformations and temperatures."""
 
-    deformation_mm: tuple[NominalDeformation, ...] = Field(
-        validation_alias="deformation"
+    deformation_mm: Deformations = Field(validation_alias="deformation")
+    temperature_C: tuple[request.Temperature, ...] = Field(
+        validation_alias="temperature"
     )
-    temperature_C: tuple[Temperature, ...] = Field(validation_alias="temperature")
-    sizes: dict[SizeName, tuple[Size, ...]] = Field(validation_alias="vary")
+    sizes: dict[request.SizeName, tuple[request.Size, ...]] = Field(
+        validation_alias="vary"
+    )
     interval: Annotated[float, within("interval")]
 
     @field_validator("sizes")
     @classmethod
     def _for_the_gear(cls, sizes: dict, info: ValidationInfo) -> dict:
-        check_sizes(info.context, sizes, info.data.get("deformation_mm", 0.0))
+        request.check_sizes(
+            request.gears_of(info), sizes, info.data.get("deformation_mm", 0.0)
+        )
         return sizes
 
 
@@ -60,40 +55,28 @@ class Study(DesignResult):
     """The force of every design.
 
     Attributes:
-        designs: an entry of each column per design: material, the sizes, deformation
-            and temperature by name; force_median_N, force_lo_N, force_hi_N with the
-            sign of the deformation; stress_MPa, the median size of the hoop bending
+        designs: material, sizes, deformation, temperature, median and ends of the force
+            with the sign of the deformation, and the median size of the hoop bending
             stress under the load.
         varied: names of the columns that were varied, in the order given.
-        interval: probability inside the band.
     """
 
     template = "design/study.md.j2"
     table = "designs"
 
     format: Literal["hdcal.study/1"] = "hdcal.study/1"
-    designs: Annotated[dict[str, np.ndarray], Field(exclude=True)]
+    designs: InstanceOf[pd.DataFrame] = Field(exclude=True)
     varied: tuple[str, ...]
 
-    @computed_field(alias="columns", json_schema_extra={"required": [*_COLUMNS]})
+    @computed_field(alias="columns")
     @property
     def columns_of_designs(self) -> dict[str, tuple[float | str, ...]]:
         """The designs by column; study.csv."""
-        return {name: tuple(each.tolist()) for name, each in self.designs.items()}
-
-    @property
-    def rows(self) -> list[dict[Hashable, Any]]:
-        """The first designs, each with the interval of its force."""
-        first = self.to_frame()[:MOST_ROWS]
-        spans = [
-            Interval(median=middle, lo=lo, hi=hi)
-            for middle, lo, hi in first[[*_FORCES]].to_numpy()
-        ]
-        return first.assign(force=spans).to_dict("records")
+        return {str(name): tuple(each) for name, each in self.designs.items()}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the designs."""
-        return pd.DataFrame(self.designs)
+        return self.designs
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the force over the size that was varied first."""
@@ -123,9 +106,6 @@ def study(
         interval: probability inside the band.
         seed: of the draws of priors.
 
-    Returns:
-        The designs, the last name of `vary` varying fastest.
-
     Raises:
         NotUsable: the calibration failed its checks.
         InputError: the request is invalid.
@@ -151,37 +131,30 @@ def study(
             interval=interval,
         )
     known = {**asked.sizes, **dict(asked)}
-    axes = {name: np.array(known[name]) for name in axes}
-    tables = [_of_material(one, axes, interval) for one in made if one]
+    grid = pd.MultiIndex.from_product([known[n] for n in axes], names=[*axes])
+    tables = [_of_material(one, grid.to_frame(False), interval) for one in made if one]
     varied = [name for name, values in axes.items() if len(values) > 1]
+    place = asked.deformation_mm, asked.temperature_C
     return Study(
-        **shared_fields(gears, *(axes[name] for name in PLACE), asked.sizes),
+        **shared_fields(gears, *place, asked.sizes, interval),
         materials=tuple(listed),
-        interval=interval,
-        designs={n: np.concatenate([t[n] for t in tables]) for n in tables[0]},
+        designs=pd.concat(tables, ignore_index=True),
         varied=(*(["material"] if len(tables) > 1 else []), *varied),
     )
 
 
-def _of_material(
-    gears: Gears, axes: dict[str, np.ndarray], interval: float
-) -> dict[str, np.ndarray]:
-    grids = np.meshgrid(*axes.values(), indexing="ij")
-    table = {name: grid.ravel() for name, grid in zip(axes, grids, strict=True)}
-    sizes = {name: table[name] for name in table if name in SIZES}
-    at, warm = (table[name] for name in PLACE)
-    tails = 0.5, 0.5 - interval / 2.0, 0.5 + interval / 2.0
+def _of_material(gears: Gears, table: pd.DataFrame, interval: float) -> pd.DataFrame:
+    """Return designs of one material, with their forces and stresses."""
+    sizes = {name: table[name].to_numpy() for name in table if name in SIZES}
+    at, warm = table[PLACE].to_numpy(float).T
     factor = np.broadcast_to(gears.factor(sizes), at.shape)
-    forces = force_quantiles(gears, at, warm, factor, tails)
+    tails = [0.5, 0.5 - interval / 2.0, 0.5 + interval / 2.0]
+    table[_FORCES] = force_quantiles(gears, at, warm, factor, tails).T
     modulus, loss = (np.median(gears.values[name]) for name in ("E0", "alpha"))
-    modulus *= 1.0 - loss * (warm - gears.gear.reference_temperature)
-    stress = peak_stress(gears.drawing(sizes), modulus, np.abs(at))
-    return {
-        "material": np.full(len(at), gears.material),
-        **table,
-        **dict(zip(_FORCES, forces, strict=True)),
-        "stress_MPa": np.broadcast_to(stress, at.shape),
-    }
+    modulus = modulus * (1.0 - loss * (warm - gears.gear.reference_temperature))
+    table["stress_MPa"] = peak_stress(gears.drawing(sizes), modulus, np.abs(at))
+    table.insert(0, "material", gears.material)
+    return table
 
 
 def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
@@ -197,9 +170,9 @@ def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
     if gears.model is None or not gears.model.effects:
         # A positive factor does not change the ranks of draws: the quantiles of the
         # tested gear hold for all sizes.
-        places, which = np.unique([at, warm], axis=1, return_inverse=True)
-        one = np.ones(places.shape[1])
-        return _quantiles(gears, *places, one, shares)[:, which.ravel()] * factor
+        (at, warm), which = np.unique([at, warm], axis=1, return_inverse=True)
+        unit = _quantiles(gears, at, warm, np.ones(len(at)), shares)
+        return unit[:, which.ravel()] * factor
     return _quantiles(gears, at, warm, factor, shares)
 
 

@@ -11,19 +11,12 @@ from hdcal.data.gear_file.validation import fault, requested, within
 from hdcal.design.charts import balance_chart
 from hdcal.design.gear_forces import Models
 from hdcal.design.gears import Gears, draw_gears
-from hdcal.design.request import Asked, Window, ascending, check_sizes
-from hdcal.design.result import (
-    DesignResult,
-    Ends,
-    Stress,
-    counted,
-    shared_fields,
-    stress_fields,
-)
-from hdcal.design.springs import Gap, Judged, judge, judge_all
+from hdcal.design.request import Asked, Window, ascending, check_sizes, gears_of
+from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
+from hdcal.design.springs import Gap, Kept, Spring, judge_all, kept_at
 from hdcal.errors import Finding, InputError
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import Interval, Item, Probability, quantity
+from hdcal.report.item import Interval, quantity
 
 # Default range of the spring rate, relative to the stiffness of the gear.
 RATE_RANGE = (0.01, 100.0)
@@ -55,32 +48,16 @@ class WindowAsked(Asked):
     @field_validator("window_mm")
     @classmethod
     def _check_window(cls, window: Ends, info: ValidationInfo) -> Ends:
-        if window[0] < 0.0 < window[1]:
+        if window[0] <= 0.0 <= window[1]:
             words = f"{window[0]:g}:{window[1]:g} contains zero"
             raise fault(words, "Give both ends one sign, e.g. 0.38:0.42")
-        check_sizes(info.context, {}, window)
+        check_sizes(gears_of(info), {}, window)
         return window
 
     @property
     def sense(self) -> int:
         """Sense of loading: +1 where the gear is pressed, −1 where it is pulled."""
         return -1 if self.window_mm[0] < 0.0 else 1
-
-
-class Kept(Item):
-    """Probabilities with one set point for every gear."""
-
-    probability: Probability = quantity("probability inside the window")
-    standard_error: float = quantity("standard error of the probability")
-    zero_backlash: Probability = quantity("probability of no backlash")
-    no_jam: Probability = quantity("probability of no jam")
-
-
-class Spring(Kept):
-    """A spring with its best set point."""
-
-    rate_N_per_mm: float = quantity("spring rate", "N/mm")
-    interference_mm: float = quantity("set point", "mm")
 
 
 class KeptAt(Kept):
@@ -168,53 +145,55 @@ def wave_generator(
     )
     gears = tested.next_ones(asked.tolerances_mm, seed, asked.sense)
     low, high = sorted(map(abs, asked.window_mm))
-    along, levels = np.linspace(low, high, _ALONG), np.array(asked.temperature_C)
+    levels, along = asked.temperature_C, np.linspace(low, high, _ALONG)
     place = np.repeat(along, len(levels)), np.tile(levels, _ALONG)
-    forces = gears.forces(*place, gears.factor({}).reshape(-1, 1)).reshape(
-        _ALONG, len(levels), -1
-    )
+    forces = gears.forces(*place, gears.factor({})).reshape(_ALONG, len(levels), -1)
     _require_growing(forces)
-    if rates is None:
-        middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
-        room = max(MOST_TRAVEL * gears.gear.geometry.radius - high, high)
-        least = max(RATE_RANGE[0] * middle, np.max(forces[-1]) / room)
-        rates = float(least), float(RATE_RANGE[1] * middle)
     error = np.random.default_rng([seed, 1]).normal(size=gears.size)
-    gap = Gap(low, high, forces[0], forces[-1], asked.setting_sd_mm * error)
+    error, least = asked.setting_sd_mm * error, 0.5 / gears.independent
+    gap, middle = (
+        Gap(low, high, forces[0], forces[-1], error, least),
+        forces[_ALONG // 2],
+    )
+    rates = rates or _usual_rates(gap, middle, float(gears.gear.geometry.radius))
     springs, chosen = judge_all(rates, gap, asked.probability)
     if chosen is None:
         raise InputError([_unmet(springs, asked)])
-    kept = []
-    for level, warm in enumerate(asked.temperature_C):
-        ends = asked.sense * forces[[0, _ALONG // 2, -1], level]
-        spans = map(Interval.of, ends[:: asked.sense])
-        here = gap._replace(
-            force_low=forces[0, [level]], force_high=forces[-1, [level]]
-        )
-        shares = _shares(judge(chosen.rate, here, chosen.x), gears)
-        at = dict(zip(("at_lo", "at_middle", "at_hi"), spans, strict=True))
-        kept.append(KeptAt(temperature_C=warm, **at, **shares))
 
-    def spring(one: Judged) -> Spring:
-        x, shares = asked.sense * one.x, _shares(one, gears)
-        return Spring(rate_N_per_mm=one.rate, interference_mm=x, **shares)
+    def mirrored(one: Spring) -> Spring:
+        place = {"interference_mm": asked.sense * one.interference_mm}
+        return one.model_copy(update=place)
 
     return WaveGenerator(
         **shared_fields(gears, asked.window_mm, levels, {}),
         materials=(gears.material,),
         asked=asked,
-        spring=spring(chosen),
-        springs=tuple(map(spring, springs)),
-        at_temperature=tuple(kept),
-        stress=Stress(**stress_fields(gears, gears.stresses({}, high, levels))),
+        spring=mirrored(chosen),
+        springs=tuple(map(mirrored, springs)),
+        at_temperature=_kept(chosen, gap, middle, asked),
+        stress=Stress.of(gears, gears.stresses({}, high, levels)),
     )
 
 
-def _shares(one: Judged, gears: Gears) -> dict[str, float]:
-    """Return the fields of `Kept`."""
-    names = "probability", "zero_backlash", "no_jam"
-    found = {n: counted(s, gears)[0] for n, s in zip(names, one[2:], strict=True)}
-    return {**found, "standard_error": counted(one.inside, gears)[1]}
+def _usual_rates(gap: Gap, middle: np.ndarray, radius: float) -> Ends:
+    stiffness = float(np.median(middle)) / (0.5 * (gap.low + gap.high))
+    room = max(MOST_TRAVEL * radius - gap.high, gap.high)
+    least = float(np.max(gap.force_high)) / room
+    return max(RATE_RANGE[0] * stiffness, least), RATE_RANGE[1] * stiffness
+
+
+def _kept(
+    spring: Spring, gap: Gap, middle: np.ndarray, asked: WindowAsked
+) -> tuple[KeptAt, ...]:
+    found = []
+    for row, warm in enumerate(asked.temperature_C):
+        ends = np.stack([gap.force_low[row], middle[row], gap.force_high[row]])
+        lo, half, hi = map(Interval.of, (asked.sense * ends)[:: asked.sense])
+        here = gap._replace(force_low=ends[:1], force_high=ends[2:])
+        kept: dict = kept_at(spring.rate_N_per_mm, spring.interference_mm, here)
+        kept |= {"temperature_C": warm, "at_lo": lo, "at_middle": half, "at_hi": hi}
+        found.append(KeptAt(**kept))
+    return tuple(found)
 
 
 def _require_growing(forces: np.ndarray) -> None:
@@ -226,12 +205,11 @@ def _require_growing(forces: np.ndarray) -> None:
         raise InputError([Finding("window", words, remedy)])
 
 
-def _unmet(springs: Sequence[Judged], asked: WindowAsked) -> Finding:
-    (low, high), best = asked.window_mm, max(springs, key=lambda one: one.inside)
-    words = (
-        f"no spring rate between {springs[0].rate:.4g} and {springs[-1].rate:.4g} N/mm "
-        f"meets {low:g} … {high:g} mm with probability {asked.probability:g}: the "
-        f"best is {best.rate:.4g} N/mm with {best.inside:.4g}"
-    )
+def _unmet(springs: Sequence[Spring], asked: WindowAsked) -> Finding:
+    (low, high), best = asked.window_mm, max(springs, key=lambda one: one.probability)
+    ends = " and ".join(f"{springs[end].rate_N_per_mm:.4g}" for end in (0, -1))
+    words = f"no spring rate between {ends} N/mm meets {low:g} … {high:g} mm with "
+    words += f"probability {asked.probability:g}: the best is {best.rate_N_per_mm:.4g} "
+    words += f"N/mm with {best.probability:.4g}"
     remedy = "Widen the window, narrow the temperatures or build the set point closer"
     return Finding("window", words, remedy)
