@@ -13,7 +13,7 @@ from hdcal.design.gears import draw_gears
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.inference.model_average import LeftOut, ModelAverage
-from hdcal.prediction.engine.causes import causes_of, independent_draws
+from hdcal.prediction.models import models_of
 
 AT, WARM = np.array([0.1, 0.4]), np.full(2, 20.0)
 
@@ -89,7 +89,7 @@ def test_probabilities_left_out_and_effective_draws_of_several_models():
     average = ModelAverage({"none": (0.7, single()), "x": (0.3, single())}, left)
     found = draw_gears(average)
     assert any("8 % of the probability" in note for note in found.model.notes)
-    each = [independent_draws(cause) for cause in causes_of(average)]
+    each = [model.independent_draws for model in models_of(average)]
     rng = np.random.default_rng(0)
     counted = [
         0.7 * rng.binomial(int(each[0]), 0.9) / int(each[0])
