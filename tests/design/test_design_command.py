@@ -10,7 +10,6 @@ import pytest
 from browser import PHONE, look
 from commands import XB1, Done, Hdcal
 from schema_checks import obeys
-from slices import slice_of
 
 from hdcal.design.inverse_design import InverseDesign, inverse_design
 from hdcal.design.study import Study, study
@@ -92,7 +91,6 @@ def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
         (["design", "RUN"], ["nothing is asked"]),
         (["design", "RUN", "--window", "0.3:0.5", "--limit-force", "7"], ["both ask"]),
         (["design", "--window", "0.3:0.5"], ["RUN: is missing"]),
-        (["design", "RUN", "--gear", "g.toml", "--window", ".3:.5"], ["given both"]),
         (["design", "RUN", "--window", ".3:.5", "--vary", WALL], ["--vary: has no"]),
         (
             ["design", "RUN", "--window", ".3:.5", "--spring-rate", "9:1"],
@@ -104,7 +102,6 @@ def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
         ),
         (["design", "nowhere", "--limit-force", "9"], ["there is no such file"]),
         (["study", "RUN"], ["nothing is varied"]),
-        (["study", "RUN", "--vary", "radius_mm=a"], ["neither start:stop:count"]),
         (
             ["study", "RUN", "--vary", "wall_thickness_mm=60", "--material", "stel"],
             ["not thinner than the radius", "Did you mean 'steel'"],
@@ -121,24 +118,22 @@ def test_bad_input_is_refused_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "kind", slice_of(["generator", "inverse", "study"], ["generator"])
-)
-def test_pages_can_be_read_and_names_are_only_text(run: Path, tmp_path: Path, kind):
+def test_pages_can_be_read_and_names_are_only_text(run: Path, tmp_path: Path):
     posterior = Posterior.load(run)
     name = "<script>alert(1)</script> $x^{$ 谐波"
     gear = replace(posterior.case.gear, name=name)
     posterior = replace(posterior, case=replace(posterior.case, gear=gear))
     sizes = {"wall_thickness_mm": (0.5, 0.8), "radius_mm": (38.0, 45.0)}
-    result = {
-        "generator": lambda: wave_generator(posterior, (0.38, 0.42)),
-        "inverse": lambda: inverse_design(posterior, sizes, 70.0),
-        "study": lambda: study(posterior, {"radius_mm": [38, 40, 42]}),
-    }[kind]()
-    assert name in result.text() and "&lt;script&gt;alert" in result._repr_html_()
-    with Target(str(tmp_path / kind)) as target:
-        write_result(result, target)
-    seen = look(tmp_path / kind / "report.html", tmp_path)
+    results = {
+        "generator": wave_generator(posterior, (0.38, 0.42)),
+        "inverse": inverse_design(posterior, sizes, 70.0),
+        "study": study(posterior, {"radius_mm": [38, 40, 42]}),
+    }
+    for result in results.values():
+        assert name in result.text() and "&lt;script&gt;alert" in result._repr_html_()
+    with Target(str(tmp_path / "out")) as target:
+        write_result(results["generator"], target)
+    seen = look(tmp_path / "out" / "report.html", tmp_path)
     assert not seen.complaints and not seen.requests
     assert not any(seen.frames[place]["past"] for place in ("phone", "desk"))
     assert seen.frames["phone"]["width"] <= PHONE

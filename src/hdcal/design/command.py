@@ -20,21 +20,12 @@ from hdcal.cli.option_types import (
     read_named,
     read_window,
 )
+from hdcal.design import AXES, SIZE_NAMES
 from hdcal.errors import Finding
 
 # Parameters of one question only.
 _OF_WINDOW = ("window", "setting_sd", "rates")
 _OF_LIMIT = ("limit_force", "limit_stress", "deformation", "vary", "materials")
-
-
-def _axes() -> tuple[str, ...]:
-    from hdcal.design.study import AXES
-
-    return AXES
-
-
-def _sizes() -> tuple[str, ...]:
-    return _axes()[:4]
 
 
 def _open(console: Console, run, gear, out, force, kind: str) -> Any:
@@ -72,7 +63,7 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
 @options.repeated_option(
     "--vary",
     metavar="SIZE_mm=LO:HI",
-    read=partial(read_named, read=read_ends, known=_sizes),
+    read=partial(read_named, read=read_ends, known=lambda: SIZE_NAMES),
     help="A size that may change: wall_thickness_mm=0.5:0.8; may be repeated.",
 )
 @options.material_option("Materials to choose among [default: the gear's].")
@@ -118,7 +109,7 @@ def design(console: Console, run, gear, out, force, **given):
 @options.repeated_option(
     "--vary",
     metavar="NAME=VALUES",
-    read=partial(read_named, read=read_grid, known=_axes),
+    read=partial(read_named, read=read_grid, known=lambda: AXES),
     help="wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45; may be repeated. Also "
     "length_mm, load_height_mm, deformation_mm, temperature_C.",
 )

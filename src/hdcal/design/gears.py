@@ -40,9 +40,7 @@ class Gears:
 
     Attributes:
         gear: sizes and material of the tested gear.
-        theory: which stiffness K multiplies.
-        material: in use.
-        facts: priors and facts of this material.
+        facts: priors and facts of the material in use.
         values: draws by site, in code units: [draw, …].
         independent: effective number of draws.
         model: of the tested gear; None where only priors are known.
@@ -103,10 +101,8 @@ class Gears:
     def forces(self, deformation: Any, temperature: Any, factor: Any = 1.0):
         """Return the force on each gear [N], shape (n, draw).
 
-        Args:
-            deformation: radial, from the free shape [mm], shape (n,).
-            temperature: of the gear [°C], shape (n,).
-            factor: stiffness over that of the tested gear [-], broadcast to (draw, n).
+        Deformations [mm] and temperatures [°C] have the shape (n,); the stiffness over
+        that of the tested gear is broadcast to (draw, n).
         """
         at, warm = self.sense * np.asarray(deformation), np.asarray(temperature)
         factor, values = np.broadcast_to(factor, (self.size, len(at))), self.values
@@ -130,13 +126,9 @@ class Gears:
         return prior and sample_prior(prior, "yield_strength", rng, self.size)
 
     def next_ones(self, tolerances: Mapping, seed: int, sense: int) -> "Gears":
-        """Draw the gears that a design has to fit.
+        """Draw the gears that a design has to fit, from ± of sizes [mm] by name.
 
-        Args:
-            tolerances: ± of sizes [mm] by name; sizes are uniform within it, which is
-                the distribution of a size with known limits (JCGM 100:2008, 4.3.7).
-            seed: of the scatter.
-            sense: of loading, +1 or −1.
+        Sizes are uniform within known limits (JCGM 100:2008, 4.3.7).
         """
         rng, deviation = np.random.default_rng(seed), 0.0
         shifts = {n: rng.uniform(-w, w, self.size) for n, w in tolerances.items()}
@@ -162,12 +154,7 @@ class Gears:
 
 
 def draw_gears(given: Models | Gear | Gears, seed: int = 0, count: int = 4000) -> Gears:
-    """Return the tested gear, once for each draw.
-
-    Args:
-        given: a calibration, or a gear with priors only.
-        seed: of the draws of priors and beyond the tested conditions.
-        count: of draws from priors.
+    """Return the tested gear, or so many gears of a file with priors only.
 
     Raises:
         NotUsable: the calibration failed its checks.

@@ -36,14 +36,7 @@ Strength = Annotated[float, within("limit_stress")]
 
 
 class LimitAsked(request.Asked):
-    """The request for an inverse design.
-
-    Attributes:
-        deformation_mm: radial, of the gear; forces have its sign.
-        limit_force_N: size of the force that must not be exceeded.
-        limit_stress_MPa: hoop bending; None for the yield strength, if one is known.
-        bounds: of each free size [mm] by name.
-    """
+    """The request for an inverse design; limits are sizes, forces have a sign."""
 
     deformation_mm: request.NominalDeformation = Field(validation_alias="deformation")
     limit_force_N: Force = Field(validation_alias="limit_force")
@@ -76,12 +69,8 @@ class LimitAsked(request.Asked):
 class Candidate(Stress):
     """One material with the sizes that were found best for it.
 
-    Attributes:
-        sizes_mm: by name, without the unit.
-        change: √Σ (ln x/x₀)², the distance from the tested gear.
-        force_kept_N: not exceeded with the required probability.
-        utilisation_kept: share of the allowed stress that is not exceeded with the
-            required probability; None where no strength is known.
+    The distance is √Σ (ln x/x₀)². What is kept is not exceeded with the required
+    probability; without a known strength no share of the stress is kept.
     """
 
     material: str = quantity("material")
@@ -171,7 +160,6 @@ class InverseDesign(DesignResult):
 
     Attributes:
         design: the candidate nearest to the tested gear.
-        tested: the tested gear itself.
         candidates: the best sizes of each material.
         target: the gears of the chosen material, and their limits.
     """

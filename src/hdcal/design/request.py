@@ -92,13 +92,7 @@ _Tolerances = Annotated[dict[SizeName, _Tolerance], AfterValidator(_of_sizes)]
 
 
 class Asked(Item):
-    """A request for gears that differ from the tested one.
-
-    Attributes:
-        temperature_C: at all of which the design has to hold.
-        probability: with which it has to hold.
-        tolerances_mm: ± of sizes by name.
-    """
+    """A request for gears that hold at all temperatures, with a probability."""
 
     temperature_C: _Levels = Field(validation_alias="temperatures")
     probability: _Probability

@@ -39,12 +39,9 @@ class DesignResult(Result):
     an independent draw remains uncertain.
 
     Attributes:
-        source: the gear that is to be changed, for each draw.
-        materials: of the gears in the answer.
         far_sizes: sizes more than a fifth off those of the tested gear [mm].
         untested: least and largest value of a deformation [mm] or temperature [°C]
             that no reading covers, and those of the readings.
-        interval: probability inside the intervals.
     """
 
     source: InstanceOf[Gears] = Field(exclude=True)
@@ -90,12 +87,12 @@ def shared_fields(
     sizes: Mapping[Any, Any],
     interval: float = INTERVAL,
 ) -> dict[str, Any]:
-    """Return the fields of every design.
+    """Return the fields of every design at deformations [mm] and temperatures [°C].
 
     Args:
         gears: of the tested gear's drawing, with scatter if there is any.
-        deformation: radial, of any sign [mm].
-        temperature: [°C].
+        deformation: radial, of any sign.
+        temperature: of the gear.
         sizes: that differ from the tested gear's [mm], by name.
         interval: probability inside the intervals.
     """

@@ -106,13 +106,7 @@ def judge(rate: float, gap: Gap) -> Spring:
 def judge_all(
     rates: tuple[float, float], gap: Gap, required: float
 ) -> tuple[list[Spring], Spring | None]:
-    """Return springs of all rates [N/mm], and the softest with a probability or None.
-
-    Args:
-        rates: the softest and the stiffest.
-        gap: to stay inside.
-        required: probability.
-    """
+    """Return springs between two rates [N/mm], and the softest suitable one or None."""
     springs = [judge(float(rate), gap) for rate in np.geomspace(*rates, _RATES)]
     met = [row for row, one in enumerate(springs) if one.probability >= required]
     if not met:

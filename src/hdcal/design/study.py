@@ -21,7 +21,6 @@ from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Item
 
 PLACE = ["deformation_mm", "temperature_C"]
-AXES = (*SIZES, *PLACE)
 MOST_DESIGNS = 100_000
 # Forces held at a time [numbers]: 16 MB.
 _BLOCK = 2_000_000
@@ -160,12 +159,8 @@ def _of_material(gears: Gears, table: pd.DataFrame, interval: float) -> pd.DataF
 def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
     """Return quantiles of the force over the draws for every design [N], (q, d).
 
-    Args:
-        gears: the tested gear for each draw.
-        at: radial deformation of the gear [mm], shape (d,).
-        warm: temperature [°C], shape (d,).
-        factor: stiffness over the tested gear's [-], shape (d,).
-        shares: probabilities, shape (q,).
+    Deformations [mm], temperatures [°C] and stiffnesses over that of the tested gear
+    have the shape (d,).
     """
     if gears.model is None or not gears.model.effects:
         # A positive factor does not change the ranks of draws: the quantiles of the

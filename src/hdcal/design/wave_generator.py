@@ -33,13 +33,7 @@ Rates = Annotated[tuple[Rate, Rate], AfterValidator(ascending)]
 
 
 class WindowAsked(Asked):
-    """The request for a wave generator.
-
-    Attributes:
-        window_mm: lo and hi of the deformation, of one sign.
-        setting_sd_mm: scatter of the set point as built.
-        rates_N_per_mm: spring rates to consider; None for the usual ones.
-    """
+    """The request for a wave generator; both ends of the window have one sign."""
 
     window_mm: Window = Field(validation_alias="window")
     setting_sd_mm: Setting = Field(validation_alias="setting_sd")
@@ -70,13 +64,9 @@ class KeptAt(Kept):
 
 
 class WaveGenerator(DesignResult):
-    """The softest spring of an elastic wave generator that keeps a window.
+    """The softest spring that keeps a window, among all rates that were considered.
 
-    Attributes:
-        spring: the softest one that meets the requirement.
-        springs: every rate that was considered, softest first.
-        at_temperature: one for each temperature of the request.
-        stress: at the largest deformation.
+    The stress is that at the largest deformation.
     """
 
     template = "design/wave_generator.md.j2"
