@@ -29,6 +29,8 @@ TIMES = (0.5, 0.9, 1.0, 1.0001, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0)
 KINDS = ("readings", "mountings", "specimens")
 # Sds of the members: zeros of mountings [N], stiffness of gears relative.
 ZERO_SD, GEAR_SD = 0.8, 0.03
+# Enough draws for an interval of 95 %.
+SAMPLED = {"chains": 2, "warmup": 500, "draws": 1500}
 # Of one size, as every other one is compiled anew.
 MEMBERS, ROWS = 5, 12
 CONTENT, CONFIDENCE = 0.9, 0.95
@@ -131,7 +133,7 @@ def answer(folder: Path, name: str) -> None:
             asked = {"content": CONTENT, "confidence": CONFIDENCE}
             asked |= {"population": truths[rig]["kind"]}
             gap = truths[rig]["with_gap"]
-            posterior = hdcal.calibrate(case, with_gap=gap, draws=500)
+            posterior = hdcal.calibrate(case, with_gap=gap, **SAMPLED)
             places = [(times * TESTED, 20.0) for times in TIMES] + [(TESTED, 80.0)]
             for at, warm in places:
                 one = hdcal.margin(posterior, at, temperature=warm, **asked).worst

@@ -160,17 +160,17 @@ def sampled(case: Case, seed: int) -> Posterior:
 
 def intervals(posterior: Posterior) -> dict[str, np.ndarray]:
     """Return 95 % intervals of load, stiffness and the next reading."""
-    (model,) = models_of(posterior, allow_failed=True)
-    warm = posterior.case.gear.reference_temperature
-    load, reading = (
-        simulate(model, Conditions.of(AT, warm, quantity=quantity))
-        for quantity in ("load", "reading")
-    )
-    one = one_member(reading)
+    (model,) = models_of(posterior)
+
+    def at(quantity):
+        warm = posterior.case.gear.reference_temperature
+        return simulate(model, Conditions.of(AT, warm, quantity=quantity))
+
+    new = one_member(at("reading"))
     return {
-        "load": np.quantile(load.centre[:, 0], TAILS),
+        "load": np.quantile(at("load").centre[:, 0], TAILS),
         "stiffness": np.quantile(model.draws["stiffness"], TAILS),
-        "next reading": np.array([one.quantile(tail)[0, 0] for tail in TAILS]),
+        "next reading": np.array([new.quantile(tail)[0, 0] for tail in TAILS]),
     }
 
 

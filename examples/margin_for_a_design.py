@@ -34,8 +34,8 @@ def main() -> None:
     posterior = hdcal.calibrate(case, warmup=500, draws=500)
     found = hdcal.margin(posterior, AT, content=0.99, limit_force=100.0)
     level = found.worst
-    print(found.population_words)
-    print(f"{found.basis}: {level.lower_bound_N:.1f} … {level.upper_bound_N:.1f} N")
+    print(found.headline)
+    print(f"99/95 bounds: {level.lower_bound_N:.1f} … {level.upper_bound_N:.1f} N")
     print(f"more than 100 N: {level.exceedance.probability:.1e}")
 
     # The textbook bound from the six slopes alone, and what is true of the batch.

@@ -14,32 +14,25 @@ RESULTS = {
 }
 # Class of another result -> who tells of it.
 TELLERS = {
-    "Bands": "prediction.bands.document.bands_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
-    "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
     "Response": "motion.respond.summary.response_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
-    "Bands": "report.tables.own_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_table",
-    "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
 }
 # -> its chart.
 CHARTS = {
-    "Bands": "prediction.bands.charts.bands_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "NextForce": "fleets.force.chart.force_chart",
     "Response": "motion.respond.chart.response_chart",
 }
-# -> what draws it where no chart holds it.
-DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}
 
 
 class Shown:
@@ -99,8 +92,6 @@ class Shown:
         if (result := self._result) is not None:
             return result.plot(ax)
         drawer = import_module("hdcal.report.chart_figure")
-        if (own := DRAWERS.get(type(self).__name__)) is not None:
-            return _room(own)(self, drawer.axes_or_new(ax))
         return drawer.draw_chart(self._ask(CHARTS), ax)
 
     @property

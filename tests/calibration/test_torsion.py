@@ -18,9 +18,7 @@ from hdcal.errors import InputError
 from hdcal.fleets.answer import FleetAnswer
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.summary import fleet_report
-from hdcal.prediction.bands.summary import prediction_answer
-from hdcal.prediction.margin.answer import MarginAnswer
-from hdcal.prediction.margin.summary import margin_report
+from hdcal.prediction.margin.result import Margin
 from hdcal.quantities import FORCE, TORQUE
 from hdcal.report.answer import json_schema
 from hdcal.report.plain import as_json
@@ -146,10 +144,10 @@ def test_a_saved_posterior_knows_its_quantities(posterior, tmp_path):
     assert again.case.units is TORQUE
     assert again.tree["posterior"]["stiffness"].attrs["units"] == "N·m/rad"
     bands = hdcal.predict(again, [0.001, 0.003])
-    assert "angle_rad" in bands.columns()
+    assert "angle_rad" in bands.to_frame()
     table = pd.read_csv(io.StringIO(bands.to_frame().to_csv()))
     assert not _in_newtons({*table.columns})
-    told = json.loads(as_json(prediction_answer(bands)))
+    told = bands.to_dict()
     assert not _in_newtons(_keys(told))
     assert "N·m" in told["headline"]
     with pytest.raises(InputError, match="rad"):
@@ -231,16 +229,14 @@ def test_a_length_with_its_unit_is_no_angle():
 def test_a_margin_is_of_torques(posterior):
     at = 8.0 * ARCMIN
     found = hdcal.margin(posterior, at, limit_force=30.0, given_force=20.0)
-    report = margin_report(found, posterior)
-    told = json.loads(as_json(report.answer))
+    told = found.to_dict()
     assert not _in_newtons(_keys(told))
     assert told["worst"]["torque_N_m"]["median"] == pytest.approx(21.3, rel=0.03)
     assert told["reached"]["median_rad"] == pytest.approx(20.0 / STIFFNESS, rel=0.05)
     assert not {"N", "mm"} & _units(told)
-    Draft202012Validator(json_schema(MarginAnswer, TORQUE)).validate(told)
-    page = report_files(report.document, report.figures())["report.html"].decode()
-    text = re.sub(r"<(style|script|svg).*?</\1>", "", page, flags=re.DOTALL)
-    for words in (told["headline"], *told["answer"], *told["remarks"], text):
+    Draft202012Validator(Margin.json_schema(TORQUE)).validate(told)
+    text = re.sub(r"<(style|script|svg).*?</\1>", "", found.page(), flags=re.DOTALL)
+    for words in (told["headline"], *told["remarks"], text):
         assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)
     assert "N·m" in told["headline"]
 

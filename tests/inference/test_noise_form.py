@@ -19,7 +19,7 @@ from hdcal.inference.checks import correlation_check, growth_check
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.noise_form import growth_p_value, noise_grows, pilot_fit
 from hdcal.inference.problem import build_problem
-from hdcal.inference.residuals import misfits
+from hdcal.inference.residuals import noise_warnings
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.inference.structure import NONE_SHOWN, decide_structure
 from hdcal.inference.values import stiffness
@@ -186,8 +186,8 @@ def test_correlated_noise_widens_what_it_should(alike):
     # Of a line through 60 readings: √((1 + ρ)/(1 − ρ)) times, less what ρ may be.
     assert 1.5 < wide / narrow < 3.5
     assert correlation_check(found.draws, ROWS).outcome == "warning"
-    assert any("independent ones" in words for words in misfits(found))
-    assert not any("independent ones" in words for words in misfits(independent))
+    assert any("independent ones" in words for words in noise_warnings(found))
+    assert not any("independent ones" in words for words in noise_warnings(independent))
     told = {check.name: check for check in independent.checks}
     found = told["neighbouring readings err independently"]
     assert found.outcome == "note" and CORRELATION not in independent.draws

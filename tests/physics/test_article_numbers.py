@@ -51,7 +51,7 @@ def test_least_squares_of_table_2(table, powers, coefficients, sd, r2):
     assert round(float(1.0 - squares[0] / about_mean), 5) == r2
     (own,) = (
         one
-        for one in fit(read_case(str(XB1)), [1, 2, 3])
+        for one in fit(read_case(str(XB1)), [1, 2, 3]).fits
         if [each.power for each in one.coefficients] == powers
     )
     values = [each.value for each in own.coefficients]

@@ -80,19 +80,14 @@ def test_laws_have_the_probability_of_the_residuals():
     assert means[1] > 3.0 * means[0]
 
 
-def test_draws_have_the_moments_of_the_mixture_of_laws():
+def test_each_draw_has_a_law_by_its_probability():
     bend, at = fit_bends(curved()[2])[1], np.array([0.3, 0.6, 0.8])
-    rng, count = np.random.default_rng(5), 200_000
-    drawn = bend.draw(at, rng.random(count), rng.normal(size=count))
-    mean, sd = bend.law(at)
-    expected = bend.chances @ mean
-    square = bend.chances @ (mean**2 + sd**2)
-    np.testing.assert_allclose(drawn.mean(axis=0), expected, atol=0.02 * sd.max())
-    scatter = np.sqrt(square - expected**2)
-    np.testing.assert_allclose(drawn.std(axis=0), scatter, rtol=0.02)
-    one = bend.draw(at, np.array([0.5]), np.array([[0.0, 1.0, -1.0]]))
+    levels = (np.arange(100_000) + 0.5) / 100_000
+    drawn = bend.of_draws(at, levels)
+    for found, law in zip(drawn, bend.law(at), strict=True):
+        np.testing.assert_allclose(found.mean(axis=0), bend.chances @ law, rtol=1e-3)
     law = int(np.searchsorted(np.cumsum(bend.chances), 0.5))
-    np.testing.assert_allclose(one[0], mean[law] + sd[law] * [0.0, 1.0, -1.0])
+    np.testing.assert_allclose(drawn[1][50_000], bend.law(at)[1][law])
 
 
 @pytest.mark.parametrize("make", slice_of([single, with_leftover], [with_leftover]))

@@ -51,7 +51,7 @@ def drawn_members(posterior, at: float, count: int = 2000) -> np.ndarray:
     # Centre and bend are those of the margin, the members are not.
     size = (len(d["K"]), count)
     load = d["stiffness"] * (at - d["deformation_offset"])
-    load = load + found.common["leftover"][:, 0]
+    load = load + found.common["bend"][:, 0]
     gear = d["specimen_sd"][:, None] * rng.normal(size=size)
     zero = d["run_offset_sd"][:, None] * rng.normal(size=size)
     noise = d["sigma"][:, None] * rng.normal(size=size)

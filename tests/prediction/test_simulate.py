@@ -23,7 +23,8 @@ from hdcal.physics.theory import THEORIES
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.prediction.models import models_of
-from hdcal.prediction.simulate import simulate, simulate_all, widest
+from hdcal.prediction.population import widest
+from hdcal.prediction.simulate import simulate, simulate_all
 from hdcal.prediction.sizes import size_nodes
 
 AT = 0.4
@@ -42,7 +43,7 @@ def line(draws: dict, at: float = AT) -> np.ndarray:
 
 def straight(members, sign: float = 1.0) -> np.ndarray:
     """Return the mean of each draw without the bend."""
-    return sign * (members.centre - members.common["leftover"])[:, 0]
+    return sign * (members.centre - members.common["bend"])[:, 0]
 
 
 def test_readings_of_one_gear_are_the_line_and_its_noise():
@@ -123,7 +124,7 @@ def test_nothing_grows_between_rest_and_the_tested_range_of_a_gear():
     for make in (single, with_leftover):
         (model,) = models_of(make(size=200))
         at = Conditions.of([-1e-6, 1e-3, 0.02, 0.3, 0.9], 20.0, quantity="gear")
-        bend = simulate(model, at).common["leftover"]
+        bend = simulate(model, at).common["bend"]
         np.testing.assert_allclose(bend[:, :2], bend[:, [2, 2]], atol=0.02)
         assert bend[:, 4].std() > 3.0 * bend[:, 3].std()
 
@@ -138,7 +139,7 @@ def test_the_rig_drifts_outside_the_tested_temperatures_by_its_priors():
     assert frame[:, 1].std() == pytest.approx(0.06, rel=0.02)
     draws = single(size=x).draws
     loss = 1.0 - 60.0 * draws["alpha"]
-    warm = found.centre[:, 1] - found.common["leftover"][:, 1]
+    warm = found.centre[:, 1] - found.common["bend"][:, 1]
     moved = draws["stiffness"] * loss * (AT + frame[:, 1] - draws["deformation_offset"])
     expected = moved + zero[:, 1] + draws["force_offset"]
     np.testing.assert_allclose(warm, expected, rtol=1e-9)
@@ -185,7 +186,7 @@ def test_tolerances_widen_as_brute_force_says():
     found = simulated(one, tolerances=SIZES)
     drawn = rng.choice(drawn_factors(one.case.gear.geometry, SIZES), (400, 4000))
     noise = one.draws["sigma"][:, None] * rng.normal(size=drawn.shape)
-    zero = one.draws["force_offset"] + found.common["leftover"][:, 0]
+    zero = one.draws["force_offset"] + found.common["bend"][:, 0]
     force = line(one.draws)[:, None] * drawn + zero[:, None] + noise
     for level in (0.01, 0.5, 0.99):
         expected = np.quantile(force, level, axis=1)
@@ -247,7 +248,7 @@ def test_unloading_begins_at_the_largest_tested_deformation(name: str):
             none = np.zeros(len(along), dtype=int)
             path = grid_records(along, np.full(len(along), 20.0), sense, 0.0, none)
             expected = float(FORCE_OF(known.problem, value, path)[0][-1])
-            centre = found[back].centre - found[back].common["leftover"]
+            centre = found[back].centre - found[back].common["bend"]
             assert centre[0, row] == pytest.approx(expected, abs=1e-6), (back, place)
     gap = found[False].centre - found[True].centre
     assert np.all(gap[:, :2] > 1.0)
@@ -290,7 +291,7 @@ def test_a_fitted_leftover_belongs_to_the_reading_and_the_load():
         np.testing.assert_allclose(
             straight(one) - straight(other), left[:, 0], atol=1e-9
         )
-    assert np.abs(simulated(gap).common["leftover"]).max() == 0.0
+    assert np.abs(simulated(gap).common["bend"]).max() == 0.0
 
 
 def test_the_public_answers_use_the_simulated_forces():

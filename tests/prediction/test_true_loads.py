@@ -58,7 +58,7 @@ def centre(posterior, quantity: str, at=AT, warm=20.0) -> np.ndarray:
     """Return the mean force of each draw without the bend."""
     (model,) = models_of(posterior)
     found = simulate(model, Conditions.of(at, warm, quantity=quantity))
-    return (found.centre - found.common["leftover"])[:, 0]
+    return (found.centre - found.common["bend"])[:, 0]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -17,10 +17,11 @@ from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
 from hdcal.inference.residual_shapes import Structure
 from hdcal.notebook import RESULTS, TELLERS, Shown
-from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = sorted({*TELLERS, *RESULTS, "Case", "Diagnosis"} - {"DynamicPosterior"})
+NAMES = sorted(
+    {*TELLERS, *RESULTS, "Bands", "Margin", "Case", "Diagnosis"} - {"DynamicPosterior"}
+)
 
 
 def test_every_public_result_is_shown():
@@ -38,9 +39,9 @@ def test_every_public_result_is_shown():
 def results():
     posterior = single()
     return {
-        "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
+        "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "tested"),
         "Fleet": (handmade(), "% softer (95 %: "),
-        "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
+        "Margin": (hdcal.margin(posterior, 0.4), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
         "NextForce": (handmade().next_force(0.4, 85.0), "gears to come need more"),
         "Posterior": (posterior, "per millimetre as read"),
@@ -85,7 +86,7 @@ def test_tables_hold_what_the_results_say(results):
     margin, verdict = results["Margin"][0], results["Diagnosis"][0]
     (level,) = margin.to_frame().itertuples()
     assert level.upper_bound_N == margin.worst.upper_bound_N
-    assert level.force_N_median == margin.worst.force_N.median
+    assert level.force_N == margin.worst.force_N.median
     probabilities = [cause.probability for cause in verdict.effects]
     assert [*verdict.to_frame().probability] == probabilities
     bands, posterior = results["Bands"][0], results["Posterior"][0]
@@ -158,14 +159,11 @@ def test_what_is_no_case_or_model_is_told_so(results):
         hdcal.calibrate(case, effects="hysteresis")
 
 
-def test_a_margin_is_drawn_as_its_figure_draws_it(results):
+def test_a_margin_is_drawn_over_temperature(results):
     posterior = results["Posterior"][0]
-    several = hdcal.margin(
-        posterior, 0.4, temperature=[20.0, 40.0], sensitivities=False
-    )
+    several = hdcal.margin(posterior, 0.4, temperature=[20.0, 40.0])
     axes = Figure().add_subplot()
     several.plot(axes)
     assert axes.get_xlabel() == "temperature [°C]"
-    chart = margin_chart(several)
-    upper = next(one for one in chart.series if "upper" in one.label)
+    (upper,) = several.charts()["margin"].panels[0].marks[-1:]
     assert list(upper.y) == [level.upper_bound_N for level in several.levels]

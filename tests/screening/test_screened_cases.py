@@ -9,7 +9,7 @@ import pytest
 import hdcal
 from hdcal.calibration.check.check import check
 from hdcal.errors import InputError
-from hdcal.prediction.bands.bands import default_bands
+from hdcal.prediction.bands.predict import default_bands
 
 RNG = np.random.default_rng(4)
 START = RNG.bit_generator.state

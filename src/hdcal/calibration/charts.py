@@ -8,12 +8,12 @@ from hdcal.calibration.check.charts import left_out
 from hdcal.data.loading import movement_words
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
-from hdcal.prediction.bands.predict import Bands
 from hdcal.prediction.bands.charts import (
     band_marks,
     branch_marks,
     branches,
 )
+from hdcal.prediction.bands.predict import Bands
 from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.chart_spec import (
     CYCLE,
@@ -69,8 +69,8 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
         panels.append(
             Panel(
                 x=axis,
-                y=load_axis(units, "measured − fit"),
-                title="distance from the fit"
+                y=load_axis(units, "measured − model"),
+                title="distance from the model"
                 if len(levels) == 1
                 else f"at {level:g} °C",
                 marks=[*marks, Rule(at=0.0), *_readings(left, distance, here, points)],
@@ -103,7 +103,7 @@ def distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
 
 def _reach(bands: Bands, distance: np.ndarray) -> float:
     """Return the largest distance of a reading or a band in the tested range [N]."""
-    inside, middle = np.asarray(bands.tested, bool), bands.physics_median_N
+    inside, middle = np.asarray(bands.tested, bool), bands.straight_N
     ends = bands.new_measurement_lo_N, bands.new_measurement_hi_N
     edges = [distance, *((end - middle)[inside] for end in ends)]
     reach = 1.12 * float(np.max(np.abs(np.concatenate(edges))))

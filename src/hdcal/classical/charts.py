@@ -9,9 +9,7 @@ from hdcal.data.records import Records
 from hdcal.report.chart_spec import CYCLE, Band, Chart, Line, Mark, Panel, Points, Rule
 
 if TYPE_CHECKING:
-    from hdcal.classical.polynomial import Polynomial
-
-_DEFORMATION = "deformation as read [mm]"
+    from hdcal.classical.fit import Polynomial
 
 
 def fit_chart(records: Records, fits: "Sequence[Polynomial]") -> Chart:
@@ -21,24 +19,15 @@ def fit_chart(records: Records, fits: "Sequence[Polynomial]") -> Chart:
     above: list[Mark] = []
     below: list[Mark] = [Rule(at=0.0)]
     for place, one in enumerate(fits):
-        colour = CYCLE[place % len(CYCLE)]
-        along = [one.force_at(value) for value in grid]
-        force, low, high = (
-            np.array([getattr(each, name) for each in along])
-            for name in ("force_N", "lo_N", "hi_N")
-        )
+        force, half, _ = one.curve(grid)
+        name, hue = one.model, CYCLE[place % len(CYCLE)]
+        low, high, left = force - half, force + half, y - one.curve(x)[0]
         dash = "solid" if one.intercept else "dashed"
-        above += [
-            Band(label=one.model, x=grid, low=low, high=high, colour=colour),
-            Line(label=one.model, x=grid, y=force, colour=colour, dash=dash),
-        ]
-        residual = y - np.polyval(one.polyfit_order, x)
-        below.append(Points(label=one.model, x=x, y=residual, colour=colour))
+        above.append(Band(label=name, x=grid, low=low, high=high, colour=hue))
+        above.append(Line(label=name, x=grid, y=force, colour=hue, dash=dash))
+        below.append(Points(label=name, x=x, y=left, colour=hue))
     above.append(Points(label="readings", x=x, y=y))
-    return Chart(
-        panels=[
-            Panel(x=_DEFORMATION, y="force as read [N]", marks=above, height=3.4),
-            Panel(x=_DEFORMATION, y="reading − curve [N]", marks=below, height=2.4),
-        ],
-        share_x=True,
-    )
+    axis = "deformation as read [mm]"
+    force = Panel(x=axis, y="force as read [N]", marks=above, height=3.4)
+    residual = Panel(x=axis, y="reading − curve [N]", marks=below, height=2.4)
+    return Chart(panels=[force, residual], share_x=True)

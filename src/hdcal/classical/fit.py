@@ -1,102 +1,105 @@
-"""Least-squares polynomials of force over deformation, compared with each other."""
+"""Least-squares polynomials of force over deformation, compared with each other.
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, ClassVar, Literal
+Intervals assume that the curve is right and that the errors of the rows are
+independent, normal and of equal size: Draper and Smith, Applied Regression Analysis.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, InstanceOf, computed_field
+from scipy import stats
 
 from hdcal.classical.charts import fit_chart
-from hdcal.classical.polynomial import (
-    SIGNIFICANCE,
-    ForceAt,
-    Polynomial,
-    columns,
-    fit_polynomial,
-)
 from hdcal.data.case import Case, require_case, require_force
 from hdcal.data.plausible import implausible
-from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, Findings
-from hdcal.prediction.bands.bands import predict
-from hdcal.prediction.engine.causes import averaging_words
-from hdcal.prediction.engine.models import Models
-from hdcal.prediction.engine.pooled import Pooled, pool
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import INTERVAL, Interval, Item, Words
-from hdcal.report.provenance import data_rows, gear_rows
+from hdcal.report.item import INTERVAL, Draws, Interval, Item, Words, quantity
 from hdcal.report.result import Result
 
-# Beyond this condition number of the scaled columns no digit of a coefficient is left.
-_WORST_CONDITION = 1e14
+_TERMS = ("c", "a ω", "b ω²", "d ω³", "e ω⁴", "f ω⁵", "g ω⁶", "h ω⁷", "i ω⁸", "j ω⁹")
 
 
-class FittedData(Item):
-    """The fitted data."""
+class Coefficient(Item):
+    """A coefficient of a polynomial with its 95 % confidence interval."""
 
-    name: str
-    gear: str
-    rows: int
-    sha256: str
-
-
-class PredictedForceAt(ForceAt):
-    """Force at a deformation, predicted by a calibration."""
-
-    temperature_C: float
-    tested: bool
+    power: int
+    value: float
+    standard_error: float
+    lo: float
+    hi: float
 
 
-class Calibrated(Item):
-    """A calibration of the same data."""
+class LackOfFit(Item):
+    """F test against the scatter of repeated rows."""
 
-    interval_kind: str = "equal-tailed credible interval"
-    theory: str
-    effects: tuple[str, ...]
-    with_gap: bool
-    stiffness_N_per_mm: Interval
-    sigma_N: Interval
-    at: PredictedForceAt | None
+    F: float
+    dof: tuple[int, int]
+    p_value: float
+
+
+class Polynomial(Item):
+    """A fitted polynomial; forces in N, deformations in mm, all as read.
+
+    Attributes:
+        coefficients: in rising order of the powers.
+        polyfit_order: all coefficients, highest power first, as polyval takes them.
+        r2: about the mean force, also without intercept; None for constant forces.
+        aicc: of Hurvich and Tsai (1989); None for exact or too few rows.
+        lack_of_fit: None where no conditions were repeated.
+        covariance: of the coefficients.
+    """
+
+    model: str
+    degree: int
+    intercept: bool
+    coefficients: tuple[Coefficient, ...]
+    polyfit_order: tuple[float, ...]
+    s_N: float = quantity("residual standard deviation", "N")
+    dof: int
+    r2: float | None
+    aicc: float | None
+    lack_of_fit: LackOfFit | None
+    force_N: Interval | None = quantity("force", "N", default=None)
+    reading_N: Interval | None = quantity("next reading", "N", default=None)
+    covariance: Draws
+
+    def curve(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return forces, and half widths of the curve and of one more reading [N]."""
+        rows, t = _columns(x, self.degree, self.intercept), _t(self.dof)
+        variance = np.sum(rows @ self.covariance * rows, axis=1)
+        half = t * np.sqrt(variance), t * np.sqrt(variance + self.s_N**2)
+        return np.polyval(self.polyfit_order, x), *half
+
+    def compared_at(self, deformation: float) -> "Polynomial":
+        """Return the curve with its force at a deformation as read [mm]."""
+        force, *half = (each[0] for each in self.curve(np.array([deformation])))
+        spans = (Interval(median=force, lo=force - h, hi=force + h) for h in half)
+        names = "force_N", "reading_N"
+        return self.model_copy(update=dict(zip(names, spans, strict=True)))
 
 
 class Fits(Result):
-    """Polynomials fitted to the same data; a sequence of them.
+    """Polynomials fitted to the same data.
 
     Attributes:
         fits: for each degree the curve with intercept, then the one without.
         at_mm: deformation at which forces are compared, as read.
-        bayesian: a calibration of the same data, to compare with.
         case: the data.
-        averaging: over which models the calibration averages, in sentences.
     """
 
     template = "classical/report.md.j2"
     table = "fits"
-    significance: ClassVar = SIGNIFICANCE
 
     format: Literal["hdcal.fit/1"] = "hdcal.fit/1"
-    data: FittedData
+    data: dict[str, str | int]
     interval: float = INTERVAL
-    interval_kind: str = (
-        "confidence interval (t), independent normal errors of one size"
-    )
+    interval_kind: str = "confidence interval (t), independent normal errors"
     fits: tuple[Polynomial, ...]
     at_mm: float | None
-    bayesian: Calibrated | None
     case: Annotated[InstanceOf[Case], Field(exclude=True)]
-    averaging: tuple[str, ...] = Field(default=(), exclude=True)
-
-    def __iter__(self) -> Iterator[Polynomial]:  # type: ignore[override]
-        """Iterate over the curves."""
-        return iter(self.fits)
-
-    def __len__(self) -> int:
-        """Return the number of curves."""
-        return len(self.fits)
-
-    def __getitem__(self, place: int) -> Polynomial:
-        """Return a curve by its place."""
-        return self.fits[place]
 
     @computed_field
     @property
@@ -104,39 +107,15 @@ class Fits(Result):
         """Remarks on the data, and what the curves do not include."""
         return self.lines("notes")
 
-    @property
-    def loop_N(self) -> float | None:
-        """Mean distance of loading from unloading; None without both."""
-        records = self.case.records
-        x, y, sense = map(
-            np.asarray, (records.deformation, records.force, records.sense)
-        )
-        up, down = sense > 0.0, sense < 0.0
-        if not (up.any() and down.any()):
-            return None
-        # A cubic takes out what depends on the deformation alone.
-        error = y - np.polyval(np.polyfit(x, y, 3), x)
-        return abs(float(error[up].mean() - error[down].mean()))
-
-    @property
-    def provenance(self) -> list[tuple[str, str]]:
-        """What was measured, as pairs of name and words."""
-        return [*gear_rows(self.case, self.case.gear.theory), *data_rows(self.case)]
-
     def make_charts(self) -> Mapping[str, Chart]:
         """Return readings, curves and residuals."""
         return {"fit": fit_chart(self.case.records, self.fits)}
 
 
 def fit(
-    case: Case,
-    degrees: Sequence[int] = (1, 3),
-    *,
-    through_origin: bool = False,
-    at: float | None = None,
-    posterior: Models | None = None,
+    case: Case, degrees: Sequence[int] = (1, 2, 3), *, at: float | None = None
 ) -> Fits:
-    """Fit polynomials of force over deformation by least squares.
+    """Fit polynomials of force over deformation, with an intercept and without.
 
     All rows have equal weights. Temperature, direction and run are not part of the
     curve: what they change stays in the residuals.
@@ -144,106 +123,103 @@ def fit(
     Args:
         case: from `read_case`.
         degrees: of the polynomials.
-        through_origin: only curves without intercept; else each degree is fitted
-            with and without.
         at: deformation at which forces are compared [mm as read]; by default the
             nominal one of the gear file.
-        posterior: a calibration of the same data, to compare with.
 
     Raises:
-        InputError: a parameter is out of range, the rows do not determine a curve, or
-            the calibration is of other data.
-        NotUsable: the calibration failed its checks.
+        InputError: a parameter is out of range, or the rows do not determine a curve.
     """
     require_case(case)
     require_force(case, "fit")
-    at = case.gear.nominal_deformation if at is None else at
-    models = None if posterior is None else pool(posterior)
-    _check_request(case, degrees, at, models)
-    records = case.records
-    x, y = np.asarray(records.deformation), np.asarray(records.force)
-    intercepts = (False,) if through_origin else (True, False)
-    curves = [(d, i) for d in dict.fromkeys(degrees) for i in intercepts]
+    at, records = case.gear.nominal_deformation if at is None else at, case.records
     with Findings() as wrong:
-        for curve in curves:
-            wrong += _undetermined(case.name, x, *curve)
-    alike = np.column_stack([x, np.round(records.temperature), records.sense])
-    repeats = np.unique(alike, axis=0, return_inverse=True)[1].ravel()
-    run = np.asarray(records.run) if "run" in records.known else None
-    fits = [fit_polynomial(x, y, *each, repeats=repeats, run=run) for each in curves]
-    best = min((one.aicc for one in fits if one.aicc is not None), default=0.0)
-    return Fits(
-        data=FittedData(
-            name=case.name, gear=case.gear.name, rows=len(y), sha256=case.data_sha256
-        ),
-        fits=tuple(_compared(one, best, at) for one in fits),
-        at_mm=at,
-        bayesian=None if models is None else _calibrated(models, at),
-        case=case,
-        averaging=() if models is None else tuple(averaging_words(models.causes)),
-        part="part" if case.gear.theory == SPRING else "gear",
-    )
-
-
-def _check_request(
-    case: Case, degrees: Sequence[int], at: float | None, models: Pooled | None
-) -> None:
-    with Findings() as wrong:
-        wrong += implausible("degrees", list(degrees))
-        if not degrees:
-            wrong.append(Finding("degrees", "is empty", "Write it like 1,3"))
-        wrong += (outside := implausible("at", at))
-        if at is not None and not outside and not abs(at) < case.gear.reach:
+        wrong += implausible("degrees", list(degrees)) + implausible("at", at)
+        if at is not None and abs(at) >= case.gear.reach:
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
-        if models is not None and models.case.data_sha256 != case.data_sha256:
-            words = f"is a calibration of other data ({models.case.name})"
-            remedy = "Name the result folder that was made from these data"
-            wrong.append(Finding("posterior", words, remedy))
-
-
-def _undetermined(
-    name: str, x: np.ndarray, degree: int, intercept: bool
-) -> list[Finding]:
-    """Return a finding where the rows do not determine a polynomial."""
-    distinct, unknowns = np.unique(x if intercept else x[x != 0.0]), degree + intercept
-    if len(distinct) < unknowns or len(x) <= unknowns:
-        words = f"{len(distinct)} different deformations do not fix degree {degree}"
-    else:
-        scaled = columns(distinct / np.max(np.abs(x)), degree, intercept)
-        if np.linalg.cond(scaled) <= _WORST_CONDITION:
-            return []
-        words = f"degree {degree} leaves no digits: the deformations lie close"
-    remedy = "Use a lower degree, or measure at more deformations"
-    return [Finding(name, words, remedy)]
-
-
-def _compared(curve: Polynomial, best: float, at: float | None) -> Polynomial:
-    over = None if curve.aicc is None else curve.aicc - best
-    force = None if at is None else curve.force_at(at)
-    return curve.model_copy(update={"aicc_over_best": over, "at": force})
-
-
-def _calibrated(models: Pooled, at: float | None) -> Calibrated:
-    return Calibrated(
-        theory=models.theory,
-        effects=tuple(effect.name for effect in models.effects),
-        with_gap=models.with_gap,
-        stiffness_N_per_mm=Interval.of(models.values["stiffness"]),
-        sigma_N=Interval.of(models.values["sigma"]),
-        at=None if at is None else _predicted(models, at),
+    x, y = np.asarray(records.deformation), np.asarray(records.force)
+    scaled = x / np.max(np.abs(x))
+    for degree in degrees:
+        rank = np.linalg.matrix_rank(_columns(scaled, degree, True))
+        if rank <= degree or rank == len(x):
+            words = f"the deformations do not determine degree {degree}"
+            remedy = "Use a lower degree, or measure at more deformations"
+            raise InputError([Finding(case.name, words, remedy)])
+    alike = np.column_stack([x, np.round(records.temperature), records.sense])
+    repeats = np.unique(alike, axis=0, return_inverse=True)[1].ravel()
+    fits = [
+        fit_polynomial(x, y, degree, intercept, repeats)
+        for degree in dict.fromkeys(degrees)
+        for intercept in (True, False)
+    ]
+    names = {"name": case.name, "gear": case.gear.name, "sha256": case.data_sha256}
+    return Fits(
+        data={**names, "rows": len(y)},
+        fits=tuple(fits if at is None else (one.compared_at(at) for one in fits)),
+        at_mm=at,
+        case=case,
     )
 
 
-def _predicted(models: Pooled, at: float) -> PredictedForceAt:
-    weighed = [(one.probability, one.posterior) for one in models.causes]
-    bands = predict(weighed, [at]).to_frame().iloc[0]
-    return PredictedForceAt(
-        force_N=bands["physics_median_N"],
-        lo_N=bands["physics_lo_N"],
-        hi_N=bands["physics_hi_N"],
-        reading_lo_N=bands["new_measurement_lo_N"],
-        reading_hi_N=bands["new_measurement_hi_N"],
-        temperature_C=bands["temperature_C"],
-        tested=bands["tested"],
+def _columns(x: np.ndarray, degree: int, intercept: bool) -> np.ndarray:
+    """Return the powers of x as columns, in rising order."""
+    return np.vander(x, degree + 1, increasing=True)[:, 0 if intercept else 1 :]
+
+
+def fit_polynomial(
+    x: np.ndarray, y: np.ndarray, degree: int, intercept: bool, repeats: np.ndarray
+) -> Polynomial:
+    """Fit a polynomial to rows; those with the same number in `repeats` are repeats."""
+    scale, powers = float(np.max(np.abs(x))), np.arange(not intercept, degree + 1)
+    design = _columns(x / scale, degree, intercept)
+    inverse = np.linalg.pinv(design)
+    (rows, unknowns), residual = design.shape, y - design @ (inverse @ y)
+    squares, dof = float(residual @ residual), rows - unknowns
+    root = inverse / scale ** powers[:, None]
+    values, covariance = root @ y, root @ root.T * (squares / dof)
+    errors, variation = np.sqrt(np.diag(covariance)), float(y.var() * rows)
+    return Polynomial(
+        model=" + ".join(_TERMS[power] for power in powers),
+        degree=degree,
+        intercept=intercept,
+        coefficients=tuple(
+            Coefficient(
+                power=power,
+                value=value,
+                standard_error=error,
+                lo=value - _t(dof) * error,
+                hi=value + _t(dof) * error,
+            )
+            for power, value, error in zip(powers.tolist(), values, errors, strict=True)
+        ),
+        polyfit_order=(*values[::-1], *([] if intercept else [0.0])),
+        s_N=np.sqrt(squares / dof),
+        dof=dof,
+        r2=1.0 - squares / variation if variation else None,
+        aicc=_aicc(rows, squares, unknowns + 1),
+        lack_of_fit=_lack_of_fit(y, repeats, unknowns, squares),
+        covariance=covariance,
     )
+
+
+def _t(dof: int) -> float:
+    return float(stats.t.ppf(0.5 + INTERVAL / 2.0, dof))
+
+
+def _aicc(rows: int, squares: float, free: int) -> float | None:
+    if rows - free - 1 <= 0 or squares == 0.0:
+        return None
+    deviance = rows * (np.log(2.0 * np.pi * squares / rows) + 1.0)
+    return deviance + 2.0 * free * rows / (rows - free - 1)
+
+
+def _lack_of_fit(y, repeats, unknowns: int, squares: float) -> LackOfFit | None:
+    count = np.bincount(repeats)
+    error = y - (np.bincount(repeats, y) / count)[repeats]
+    extra, free = len(count) - unknowns, len(y) - len(count)
+    below = float(error @ error)
+    if extra < 1 or free < 1 or below <= 0.0:
+        return None
+    ratio = max(squares - below, 0.0) / extra / (below / free)
+    p_value = float(stats.f.sf(ratio, extra, free))
+    return LackOfFit(F=ratio, dof=(extra, free), p_value=p_value)

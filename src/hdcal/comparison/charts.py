@@ -15,14 +15,9 @@ if TYPE_CHECKING:
 def stiffness_chart(results: "Sequence[Compared]", units: Quantities) -> Chart:
     """Return the stiffness of each result with its interval."""
     spans = [one.stiffness_N_per_mm for one in results]
-    points = Points(
-        label="median and 95 % credible interval",
-        x=np.arange(1.0, len(spans) + 1.0),
-        y=np.array([span.median for span in spans]),
-        low=np.array([span.lo for span in spans]),
-        high=np.array([span.hi for span in spans]),
-        colour=ORANGE,
-    )
+    median, low, high = np.transpose([(s.median, s.lo, s.hi) for s in spans])
+    x, label = np.arange(1.0, len(spans) + 1.0), "median and 95 % credible interval"
+    points = Points(label=label, x=x, y=median, low=low, high=high, colour=ORANGE)
     axis = f"{units.stiffness} as read [{units.stiffness_unit}]"
     names = [one.name for one in results]
     return Chart(panels=[Panel(x="result", y=axis, marks=[points], names=names)])

@@ -149,9 +149,10 @@ def _stiffness(fits: Refits) -> Interval | None:
     """Return the stiffness as read over all models [N/mm]."""
     if not fits.posteriors:
         return None
-    from hdcal.prediction.engine.pooled import pool
+    from hdcal.prediction.models import joint_draws, models_of
 
-    return Interval.of(pool([*fits.posteriors.values()]).values["stiffness"])
+    models = models_of([*fits.posteriors.values()])
+    return Interval.of(joint_draws(models, "stiffness"))
 
 
 def _how_far(

@@ -12,7 +12,7 @@ from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
 from hdcal.inference.identifiability import Linearisation, linearise
 from hdcal.inference.padding import pad_records
-from hdcal.inference.posterior import HYPOTHESIS, Posterior
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
     Correlated,
@@ -29,13 +29,6 @@ from hdcal.quantities import FORCE, Quantities
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
 _DRAWS = 200
-
-# How a warning begins that a shape is left in the residuals.
-SHAPED = "This takes the model's shape for right, but its residuals have one."
-_SMALL_SHAPE = "That is left out, and little beside the noise."
-# Share of the noise below which a shape widens what one reading does by a twentieth.
-_SMALL = 1.0 / 3.0
-UNNAMED = "No cause named makes it"
 
 
 @dataclass(frozen=True, repr=False)
@@ -148,29 +141,15 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     )
 
 
-def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
-    """Return a warning for each shape or fault of the noise in the residuals.
+def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
+    """Return a warning for each fault of the noise, for answers that rest on it.
 
-    For answers that take the model for right.
+    A shape of the residuals is no such fault: what is predicted has a bend for it.
 
     Args:
         posterior: from `calibrate`.
-        shapes: whether to warn of shapes.
     """
-    left = residuals(posterior)
-    diagnosed = HYPOTHESIS in posterior.settings
-    remedy = UNNAMED if diagnosed else "Diagnose"
-    if posterior.problem.discrepancy is None:
-        remedy += ": calibrate with a gap" if diagnosed else ", or calibrate with a gap"
-    small = _SMALL * float(np.median(posterior.draws["sigma"]))
-    structure = left.structure if shapes else ()
-    words = [
-        f"{SHAPED} {shape.words.rstrip('.')}. {remedy}."
-        for shape in structure
-        if shape.size_N > small
-    ]
-    words += [f"{s.words} {_SMALL_SHAPE}" for s in structure if s.size_N <= small]
-    words += [fault.words for fault in left.noise]
+    words = [fault.words for fault in residuals(posterior).noise]
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
     if alike.outcome == "warning":
         words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")

@@ -90,19 +90,18 @@ class Bend:
         taken = square * ((1.0 / self.spread.T) @ (cross.T**2))
         return mean, np.sqrt(np.maximum(square * (prior - taken), 0.0))
 
-    def draw(
-        self, deformation: np.ndarray, level: np.ndarray, score: np.ndarray
-    ) -> np.ndarray:
-        """Return the bend of each draw [N], shape (d, n).
+    def of_draws(
+        self, deformation: np.ndarray, level: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and sd of the bend of each draw [N], (d, n) each.
 
         Args:
             deformation: as read [mm], shape (n,).
             level: selects a law by its probability, between 0 and 1, (d,).
-            score: place within this law, standard normal, (d,) or (d, n).
         """
         mean, sd = self.law(deformation)
         law = np.searchsorted(np.cumsum(self.chances)[:-1], level)
-        return mean[law] + sd[law] * np.reshape(score, (len(level), -1))
+        return mean[law], sd[law]
 
 
 def fit_bends(posterior: Posterior) -> tuple[Bend, Bend]:

@@ -99,7 +99,7 @@ def forces_of_draws(
     problem: Problem,
     draws: Values,
     path: Records,
-    factor: Float[Array, "draw node 1"],
+    factor: Float[Array, "draw node n"],
     moved: Float[Array, "draw n"],
     leftover: Float[Array, " asked"],
     *,
@@ -112,7 +112,7 @@ def forces_of_draws(
         problem: structure.
         draws: parameters by site: [draw, …].
         path: rows that lead to the conditions; the last ones are the conditions.
-        factor: on the stiffness [-].
+        factor: on the stiffness at each row of the path [-].
         moved: radial deformation that the frame gains at each row of the path [mm].
         leftover: share of the fitted leftover discrepancy that acts.
         quantity: which force.
@@ -120,8 +120,9 @@ def forces_of_draws(
 
     Returns:
         Force (draw, node, asked) [N], its derivative by the factor [N], logarithms of
-        the shares of the components of the noise (draw, node, component), and their
-        sds (draw, node, component, asked) [N].
+        the shares of the components of the noise (draw, node, component), their sds
+        (draw, node, component, asked) [N], and the leftover discrepancy in the force
+        (draw, asked) [N].
     """
 
     def of_draw(value, factor, moved):
@@ -131,7 +132,8 @@ def forces_of_draws(
             mean, noise = force_of(
                 problem, value, path, factor=factor, moved=moved, quantity=quantity
             )
-            total = mean[-asked:] + (left * factor if quantity == "gear" else left)
+            scale = factor[-asked:] if quantity == "gear" else 1.0
+            total = mean[-asked:] + scale * left
             return total, (noise.log_weight, noise.sd[:, -asked:])
 
         def with_slope(factor):
@@ -139,7 +141,7 @@ def forces_of_draws(
             mean, slope, noise = jax.jvp(force, (factor,), (one,), has_aux=True)
             return mean, slope, *noise
 
-        return jax.vmap(with_slope)(factor)
+        return *jax.vmap(with_slope)(factor), left
 
     return jax.vmap(of_draw)(draws, factor, moved)
 

@@ -11,11 +11,12 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.physics.effect import Effect
 from hdcal.prediction.extrapolation import Bend, fit_bends
 from hdcal.report.words import hypothesis, percent
 
 # Sites of the tested members: a future member has none of these values.
-_TESTED = ("run_offset", "specimen_deviation")
+TESTED = ("run_offset", "specimen_deviation")
 # A smaller probability is the rounding error of a sum.
 _ROUNDING = 1e-6
 
@@ -44,7 +45,7 @@ class Model:
     probability: float
     posterior: Posterior
 
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """Structure of the model."""
         return self.posterior.problem
@@ -53,7 +54,7 @@ class Model:
     def draws(self) -> dict[str, np.ndarray]:
         """Parameters by site in code units, without those of tested members."""
         held = self.posterior.draws.items()
-        return {name: values for name, values in held if name not in _TESTED}
+        return {name: values for name, values in held if name not in TESTED}
 
     @property
     def size(self) -> int:
@@ -76,6 +77,37 @@ class Model:
     def bends(self) -> tuple[Bend, Bend]:
         """Bends that the readings leave possible, below and above their range."""
         return fit_bends(self.posterior)
+
+    @property
+    def effects(self) -> tuple[type[Effect], ...]:
+        """Effects in the model."""
+        return self.posterior.effects
+
+    def bend(self, place: np.ndarray, level: np.ndarray):
+        """Return mean and sd of the bend of each draw [N], (draw, row) each.
+
+        Inside the tested range both bends describe the same residuals, each best near
+        its end. A fitted leftover covers that range: beside it the bend acts beyond.
+
+        Args:
+            place: deformation as read [mm], (row,).
+            level: selects a law of the bend by its probability, (draw,).
+        """
+        below, above = self.bends
+        upper = np.clip(above.place(place), 0.0, 1.0)
+        acting = 1.0
+        if self.posterior.problem.discrepancy is not None:
+            acting = self.beyond(place)
+        ends = above.of_draws(place, level), below.of_draws(place, level)
+        return tuple(
+            acting * (upper * high + (1.0 - upper) * low)
+            for high, low in zip(*ends, strict=True)
+        )
+
+    def beyond(self, place: np.ndarray) -> np.ndarray:
+        """Return the share of a fitted leftover that the bend replaces, (row,)."""
+        below, above = self.bends
+        return np.maximum(above.beyond(place), below.beyond(place))
 
     @property
     def independent_draws(self) -> float:
@@ -171,3 +203,16 @@ def averaging_words(models: Models) -> list[str]:
             f"{hypothesis(missing.counted_as)}."
         )
     return words
+
+
+def joint_draws(models: Sequence[Model], site: str, count: int = 4000) -> np.ndarray:
+    """Return draws of a parameter over all models, (count,), each by its weight.
+
+    Args:
+        models: with their probabilities.
+        site: of every model.
+        count: number of draws.
+    """
+    values = np.concatenate([model.draws[site] for model in models])
+    ends = np.cumsum(np.concatenate([model.weights for model in models]))
+    return values[np.searchsorted(ends / ends[-1], (np.arange(count) + 0.5) / count)]

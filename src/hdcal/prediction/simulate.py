@@ -7,7 +7,6 @@ responses and tracking.
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Literal, get_args
 
 import numpy as np
 from scipy.special import ndtri
@@ -15,17 +14,15 @@ from scipy.special import ndtri
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
-from hdcal.errors import Finding
 from hdcal.inference.distributions import moments
-from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
 from hdcal.prediction.conditions import Conditions, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
 from hdcal.prediction.members import Members, joined
 from hdcal.prediction.models import Model
+from hdcal.prediction.population import Population
 from hdcal.prediction.sizes import size_nodes
 
-Population = Literal["readings", "mountings", "specimens"]
-POPULATIONS: tuple[Population, ...] = get_args(Population)
 # What the draws leave open about all members: standard normal scores of each draw, and
 # `law`, the level at which a law of the bend is selected.
 SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
@@ -33,7 +30,8 @@ SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
 DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}
 # Certified errors of gauges: inputs of their own, where a load is asked for.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
-# Parameters that are inputs of their own where the prior determines them.
+# Parameters that are inputs of their own where the prior determines them; the zero of
+# the gauge is one of every load.
 SEPARATE = ("alpha", "force_offset")
 
 
@@ -64,27 +62,20 @@ def simulate(
     gear = gear_sd * score["gear"] / max(gears, 1) ** 0.5
     mounting = zero_sd * score["mounting"] / max(mountings, 1) ** 0.5
     drift = _drifts(model, at, score)
-    bend, leftover = _bend(model, at, score)
+    bend, acting = _bend(model, at, score)
     theory, tested = model.posterior.theory, model.posterior.case.gear.geometry
     nodes, node_share = size_nodes(tested, at.tolerances, theory)
-    path = _path(at, model.posterior.case.records)
-    repeats = len(path.deformation) // at.size
-    force, slope, log_share, noise = (
-        np.asarray(found)
-        for found in forces_of_draws(
-            problem,
-            draws,
-            path,
-            ((1.0 + gear)[:, None] * nodes)[:, :, None] * at.factor,
-            np.tile(drift["frame_drift"], repeats),
-            leftover,
-            quantity=at.quantity,
-            asked=at.size,
-        )
+    factor = np.broadcast_to(at.factor, (count, at.size))[:, None]
+    force, slope, log_share, noise, left = _forces(
+        model,
+        at,
+        (1.0 + gear)[:, None, None] * nodes[:, None] * factor,
+        drift["frame_drift"],
+        acting,
     )
     along = at.loading * (force + (bend + drift["zero_drift"])[:, None])
     along = along + mounting[:, None, None]
-    own = (slope * at.factor * nodes[:, None] * gear_sd[:, None, None]) ** 2
+    own = (slope * factor * nodes[:, None] * gear_sd[:, None, None]) ** 2
     noise = noise**2 if reading else np.zeros_like(noise[:, :, :1])
     share = node_share[:, None] * (np.exp(log_share) if reading else 1.0)
     share = np.broadcast_to(share, noise.shape[:3])
@@ -94,16 +85,18 @@ def simulate(
     scatter = {"noise": within, "gear": np.einsum("n,dnr->dr", node_share, own)}
     scatter["mounting"] = np.broadcast_to(zero_sd[:, None] ** 2, within.shape)
     scatter |= _of_sizes(model, at, along, node_share)
+    # A load is what is left of a reading once the zero of the gauge is taken off.
+    separate = "force_offset" if at.quantity == "load" else ""
     common = {"gear": gear, "mounting": mounting} | {
         name: draws[name]
         for name in (*CERTIFIED, *SEPARATE)
-        if name in draws and model.driver(name) == "prior"
+        if name in draws and (model.driver(name) == "prior" or name == separate)
     }
     common = {
         name: np.broadcast_to(values[:, None], within.shape)
         for name, values in common.items()
     }
-    common |= {"leftover": at.loading * bend, **drift}
+    common |= {"bend": at.loading * bend, "leftover": at.loading * left, **drift}
     return Members(
         model.weights,
         share.reshape(count, -1),
@@ -112,6 +105,51 @@ def simulate(
         scatter,
         common,
     )
+
+
+def gear_forces(
+    model: Model, at: Conditions, draws: Values | None = None, *, seed: int = 0
+) -> np.ndarray:
+    """Return the force of every draw on gears by themselves [N], (draw, row).
+
+    Each row is another gear, loaded from its free shape, without zeros, errors and
+    drifts of a rig.
+
+    Args:
+        model: whose posterior is simulated.
+        at: with the quantity `gear`, and a factor on the stiffness where sizes or
+            modulus are not the tested ones, (row,) or (draw, row).
+        draws: other values of the parameters, such as those of another material.
+        seed: of the scores of what the draws leave open.
+    """
+    bend, acting = _bend(model, at, _scores(model.size, seed))
+    factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
+    moved = np.zeros((model.size, at.size))
+    return _forces(model, at, factor, moved, acting, draws)[0][:, 0] + bend
+
+
+def gear_leftover(
+    model: Model, deformation: np.ndarray, *, seed: int = 0
+) -> np.ndarray:
+    """Return what a gear by itself has beside model and effects [N], (draw, row).
+
+    The bend, and the fitted leftover as the mean of loading and unloading.
+
+    Args:
+        model: whose posterior is simulated.
+        deformation: from the free shape, per mm as read, (row,).
+        seed: of the scores of what the draws leave open.
+    """
+    score, sign = _scores(model.size, seed), np.where(deformation < 0.0, -1.0, 1.0)
+    warm = model.posterior.case.gear.reference_temperature
+    ways = [
+        Conditions.of(deformation, warm, sign, unloading, quantity="gear")
+        for unloading in (False, True)
+    ]
+    bend, acting = _bend(model, ways[0], score)
+    one = np.ones((model.size, 1, len(deformation)))
+    moved = np.zeros((model.size, len(deformation)))
+    return bend + np.mean([_forces(model, at, one, moved, acting)[4] for at in ways], 0)
 
 
 def simulate_all(
@@ -126,6 +164,25 @@ def simulate_all(
     Each draw has the weight of its model; sources of scatter are left out.
     """
     return joined([simulate(model, at, population, seed=seed) for model in models])
+
+
+def _forces(
+    model: Model, at: Conditions, factor, moved, acting, draws: Values | None = None
+) -> tuple[np.ndarray, ...]:
+    """Return what `forces_of_draws` does."""
+    path = _path(at, model.posterior.case.records)
+    repeats = len(path.deformation) // at.size
+    found = forces_of_draws(
+        model.problem,
+        model.draws if draws is None else draws,
+        path,
+        np.tile(factor, repeats),
+        np.tile(moved, repeats),
+        acting,
+        quantity=at.quantity,
+        asked=at.size,
+    )
+    return tuple(map(np.asarray, found))
 
 
 def _path(at: Conditions, records: Records) -> Records:
@@ -163,24 +220,20 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
     Shapes (draw, row) and (row,). A bend that is drawn from its prior is drawn along
     the direction of loading, so that mirrored data have the mirrored answer.
     """
-    below, above = model.bends
     place = at.deformation
     if at.quantity == "gear":
         place = place + float(np.mean(model.draws["deformation_offset"]))
         # The free shape is known, without force: no bend grows between it and the
         # nearer end of the tested range.
+        _, above = model.bends
         low, high = above.far, above.end
         known = np.clip(place, min(low, 0.0), max(high, 0.0))
         place = np.clip(place, low, high) + (place - known)
-    scores = score["bend"][:, None] * at.loading
-    # Inside the range both describe the same residuals, each best near its end.
-    upper = np.clip(above.place(place), 0.0, 1.0)
-    bend = upper * above.draw(place, score["law"], scores)
-    bend += (1.0 - upper) * below.draw(place, score["law"], scores)
-    if model.problem.discrepancy is not None:
-        beyond = np.maximum(above.beyond(place), below.beyond(place))
-        return beyond * bend, 1.0 - beyond
-    return (bend * at.factor if at.quantity == "gear" else bend), np.ones(at.size)
+    mean, sd = model.bend(place, score["law"])
+    bend = mean + sd * score["bend"][:, None] * at.loading
+    if at.quantity == "gear":
+        bend = bend * at.factor
+    return bend, 1.0 - model.beyond(place)
 
 
 def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
@@ -196,7 +249,7 @@ def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
     stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
     priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
     priors |= case.gear.effect_priors
-    held = {effect.name for effect in model.posterior.effects}
+    held = {effect.name for effect in model.effects}
     drifts = {}
     for name, effect in DRIFTS.items():
         mean, sd = moments(priors[f"{effect}.slope"])
@@ -223,28 +276,3 @@ def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
     }
     total = sum(alone.values())
     return {name: together * part / total for name, part in alone.items()}
-
-
-def widest(problem: Problem) -> Population:
-    """Return the widest population of which the data hold two members or more."""
-    if problem.specimens >= 2:
-        return "specimens"
-    return "mountings" if problem.runs >= 2 else "readings"
-
-
-def population_findings(asked: str | None, problem: Problem) -> list[Finding]:
-    """Return why the data cannot describe a population; empty where they can."""
-    if asked is None or asked == "readings":
-        return []
-    if asked not in POPULATIONS:
-        words = f"'{asked}' is unknown"
-        return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
-    what, count = {
-        "mountings": ("mounting (run)", problem.runs),
-        "specimens": ("gear (specimen)", problem.specimens),
-    }[asked]
-    if count >= 2:
-        return []
-    words = f"the data hold one {what}, which does not show how much others differ"
-    remedy = f"Measure two or more, or ask about {widest(problem)}"
-    return [Finding("population", words, remedy)]

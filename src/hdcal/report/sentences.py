@@ -17,7 +17,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.report.plain import printable
-from hdcal.report.words import capital, label, load, number, percent, unit
+from hdcal.report.words import capital, hypothesis, label, load, number, percent, unit
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -61,6 +61,7 @@ def _environment(plain: bool) -> Environment:
     environment.filters |= {
         "capital": capital,
         "code": code,
+        "hypothesis": hypothesis,
         "label": label,
         "median": median,
         "load": load,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _BANDS = (
     ("new_measurement", "one new reading", 0.16),
     ("with_gap", "with the leftover discrepancy", 0.22),
-    ("physics", "{load} model", 0.38),
+    ("physics", "mean {load}", 0.38),
 )
 _UNTESTED = "not tested: extrapolated"
 

@@ -38,7 +38,8 @@ from hdcal.prediction.models import (
     models_of,
     probabilities,
 )
-from hdcal.prediction.simulate import simulate_all, widest
+from hdcal.prediction.population import widest
+from hdcal.prediction.simulate import simulate_all
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Draws, Interval, Probability, quantity
 from hdcal.report.result import Result
@@ -57,7 +58,7 @@ class Bands(Result):
         deformation_mm: as read.
         temperature_C: of the specimen.
         direction: up or down.
-        physics_lo_N: credible band of the mean reading.
+        physics_lo_N: credible band of the mean reading, without a fitted leftover.
         with_gap_lo_N: credible band with the leftover discrepancy; NaN if not fitted.
         new_measurement_lo_N: predictive band of one more reading, on a new run and a
             new specimen where these were fitted, with the rounding of the rig.
@@ -193,13 +194,13 @@ def predict(
             at[rows], warm[rows], loading[rows], (sense != loading)[rows]
         )
         blocks.append(_quantiles(found, place, tails, seed))
-    mean, new, straight = (
+    mean, physics, new, straight = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )
     leftover = any(model.problem.discrepancy is not None for model in found)
     usable = all(model.posterior.usable for model in found)
-    without = np.full_like(mean, np.nan)
-    columns = np.concatenate([mean, mean if leftover else without, new])
+    with_gap = mean if leftover else np.full_like(mean, np.nan)
+    columns = np.concatenate([physics, with_gap, new])
     bands = [name for name in COLUMNS if name.endswith("_N")]
     return Bands(
         **dict(zip(bands, columns, strict=True)),
@@ -220,9 +221,10 @@ def predict(
 
 
 def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
-    """Return quantiles of the mean and of a new reading, and the straight median [N].
+    """Return quantiles [N] at every row, the tails first.
 
-    Shapes (3, row), (3, row) and (row,).
+    Of the mean, of the mean without a fitted leftover discrepancy, of a new reading,
+    (3, row) each; and the median of the model alone, (row,).
     """
     problem = models[0].problem
     # The mean is that of the tested gears and mountings, a new reading of a new one.
@@ -235,13 +237,17 @@ def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
     levels, scores, rounding = (rng.permutation(even) for _ in range(3))
     new = members.sample(levels, ndtri(scores))
     new += float(problem.step) * (rounding - 0.5)[:, None]
-    centre = tested.centre
-    straight = centre - tested.common["leftover"]
-    found = []
-    for values, shares in ((centre, tails), (new, tails), (straight, [0.5])):
-        quantiles = over_draws(at.loading * values, members.weight, shares)
-        found.append(quantiles)
-    return found[0], found[1], found[2][0]
+    mean = tested.centre
+    physics = mean - tested.common["leftover"]
+    straight = physics - tested.common["bend"]
+
+    def quantiles(values, shares):
+        return over_draws(at.loading * values, members.weight, shares)
+
+    fitted = any(model.problem.discrepancy is not None for model in models)
+    found = quantiles(mean, tails)
+    without = quantiles(physics, tails) if fitted else found
+    return found, without, quantiles(new, tails), quantiles(straight, [0.5])[0]
 
 
 def _numbers(name: str, given: Any) -> np.ndarray:

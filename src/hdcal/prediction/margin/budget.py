@@ -33,11 +33,12 @@ _INPUTS: dict[str, tuple[str, str, str, str]] = {
     "length": ("tolerance of the length", "N", "rectangular", ""),
     "load_height": ("tolerance of the load height", "N", "rectangular", ""),
     "cause": ("which effect acts", "N", "discrete", "stiffness"),
-    "leftover": ("bend that the readings leave possible", "N", "posterior", "bend"),
+    "bend": ("bend that the readings leave possible", "N", "posterior", "bend"),
+    "leftover": ("fitted leftover discrepancy", "N", "posterior", "bend"),
     "zero_drift": ("zero of the gauge with temperature", "N", "normal", ""),
     "frame_drift": ("frame of the rig with temperature", "mm", "normal", ""),
     "alpha": ("loss of modulus per kelvin", "1/K", "prior", ""),
-    "force_offset": ("zero of the {load} gauge", "N", "prior", ""),
+    "force_offset": ("zero of the {load} gauge", "N", "posterior", "force_offset"),
     "force_gain": ("{load} gauge, certificate", "1", "normal", ""),
     "deformation_gain": ("displacement gauge, certificate", "1", "normal", ""),
     "temperature_offset": ("thermometer, certificate", "K", "normal", ""),
@@ -146,7 +147,7 @@ def _row(name: str, row, total: float, main: Model, direction: int, units) -> Bu
     own, tied, variance = map(float, row)
     label, unit, distribution, site = _INPUTS[name]
     contribution = variance**0.5
-    scatter = unit == "N"
+    scatter = unit == "N" and name != "force_offset"
     by_data = site in _TYPE_A or (site != "" and main.driver(site) == "data")
     return BudgetRow(
         component=label.format(load=units.load),

@@ -53,8 +53,18 @@ def force_chart(found: "Margin") -> Chart:
                 "mean, 95 %",
             ],
             horizontal=True,
+            y_limits=_limits(found),
         )
     return Chart(panels=[panel])
+
+
+def _limits(found: "Margin") -> tuple[float, float]:
+    """Return ends of the axis with room beside the bars."""
+    level, sign = found.worst, found.loading_sense
+    ends = [level.lower_bound_N, level.upper_bound_N]
+    ends += [] if found.limit_force_N is None else [sign * found.limit_force_N]
+    room = 0.06 * (max(ends) - min(ends))
+    return min(ends) - room, max(ends) + room
 
 
 def _bounds(found: "Margin") -> str:

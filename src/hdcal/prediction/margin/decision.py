@@ -1,4 +1,4 @@
-"""Decision whether a force keeps a limit (ISO/IEC 17025, JCGM 106:2012, ILAC-G8)."""
+"""Conformity whether a force keeps a limit (ISO/IEC 17025, JCGM 106:2012, ILAC-G8)."""
 
 from typing import Literal
 
@@ -8,8 +8,8 @@ from hdcal.report.item import Item, Probability, quantity
 Statement = Literal["conforms", "does not conform", "undecided"]
 
 
-class Decision(Item):
-    """Decision on one member; limit and guard band are sizes along the loading.
+class Conformity(Item):
+    """Conformity on one member; limit and guard band are sizes along the loading.
 
     Attributes:
         rule: guarded or simple.
@@ -32,7 +32,7 @@ class Decision(Item):
 
 def decide(
     rule: Rule, limit: float, estimate: float, low: float, high: float, risk: float
-) -> Decision:
+) -> Conformity:
     """Return the decision.
 
     Args:
@@ -48,7 +48,7 @@ def decide(
     least, most = (low, high) if rule == "guarded" else (estimate, estimate)
     rejected = "does not conform" if least > limit else "undecided"
     guard = most - estimate
-    return Decision(
+    return Conformity(
         rule=rule,
         limit_N=limit,
         guard_band_N=guard,

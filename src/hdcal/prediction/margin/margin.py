@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.data.theory_names import SPRING
-from hdcal.inference.checks import correlation_check
-from hdcal.inference.residuals import residuals
+from hdcal.inference.residuals import noise_warnings
 from hdcal.prediction.conditions import (
     SENSE,
     Conditions,
@@ -27,13 +26,13 @@ from hdcal.prediction.margin.budget import budget
 from hdcal.prediction.margin.decision import decide
 from hdcal.prediction.margin.reached import deformation_reached
 from hdcal.prediction.margin.request import (
-    Request,
+    MarginRequest,
     Rule,
     require_answerable,
     require_numbers,
 )
 from hdcal.prediction.margin.result import (
-    Calibrated,
+    CalibrationSource,
     Exceedance,
     Level,
     Margin,
@@ -48,8 +47,9 @@ from hdcal.prediction.models import (
     models_of,
     probabilities,
 )
+from hdcal.prediction.population import Population, widest
 from hdcal.prediction.shares import RAREST
-from hdcal.prediction.simulate import Population, simulate, widest
+from hdcal.prediction.simulate import simulate
 from hdcal.prediction.sizes import SIZES
 from hdcal.report.item import INTERVAL, Interval
 from hdcal.versions import versions
@@ -113,7 +113,7 @@ def margin(
     found = models_of(models)
     case = found[0].posterior.case
     warm = usual_temperature(case) if temperature is None else temperature
-    asked = Request(
+    asked = MarginRequest(
         deformation=deformation,
         temperature=np.atleast_1d(np.asarray(warm, float)),
         direction_of_loading=direction_of_loading(found, deformation),
@@ -133,7 +133,7 @@ def margin(
     return _answered(found, asked, models)
 
 
-def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margin:
+def _answered(found: tuple[Model, ...], asked: MarginRequest, models: Models) -> Margin:
     at = Conditions.of(
         asked.deformation,
         asked.temperature,
@@ -152,7 +152,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
         found, here, step / 12.0**0.5, sign, posterior.case.units
     )
     expanded = 0.5 * (worst.member_N.hi - worst.member_N.lo)
-    bend = np.concatenate([sign * part.common["leftover"][:, 0] for part in here])
+    bend = np.concatenate([sign * part.common["bend"][:, 0] for part in here])
     weight = np.concatenate([part.weight for part in here])
     mean = float(weight @ bend)
     return Margin(
@@ -175,7 +175,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
         budget=rows,
         decision=_decision(asked, worst, estimate, step),
         reached=deformation_reached(found, asked, at, worst.temperature_C),
-        models=_each_model(found, here, asked, step) if len(found) > 1 else (),
+        models=_each_model(found, here, asked, step),
         causes=probabilities(found),
         weight_left_out=left_out_of(models),
         beyond_tested=beyond_tested(asked.deformation, posterior.case.records),
@@ -186,7 +186,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
         posterior=posterior,
         bend_N=(mean, float(weight @ (bend - mean) ** 2) ** 0.5),
         averaging=tuple(averaging_words(models)),
-        warnings=_warnings(found),
+        warnings=noise_warnings(posterior),
         turn_mm=float(at.turn(posterior.case.records)[0]),
         part="part" if posterior.theory == SPRING else "gear",
         units=posterior.case.units,
@@ -194,7 +194,7 @@ def _answered(found: tuple[Model, ...], asked: Request, models: Models) -> Margi
 
 
 def _levels(
-    found: Sequence[Model], asked: Request, members: Members, step: float
+    found: Sequence[Model], asked: MarginRequest, members: Members, step: float
 ) -> tuple[Level, ...]:
     """Return the force at each temperature.
 
@@ -283,7 +283,7 @@ def _exceedance(
     )
 
 
-def _decision(asked: Request, worst: Level, estimate: float, step: float):
+def _decision(asked: MarginRequest, worst: Level, estimate: float, step: float):
     if asked.limit_force is None or worst.exceedance is None:
         return None
     sign, span = asked.direction_of_loading, worst.member_N
@@ -294,9 +294,12 @@ def _decision(asked: Request, worst: Level, estimate: float, step: float):
 
 
 def _each_model(
-    found: Sequence[Model], parts: Sequence[Members], asked: Request, step: float
+    found: Sequence[Model], parts: Sequence[Members], asked: MarginRequest, step: float
 ) -> tuple[ModelBound, ...]:
+    """Return the bounds of each of several models; of one none."""
     sign, bounds = asked.direction_of_loading, []
+    if len(found) == 1:
+        return ()
     for model, part in zip(found, parts, strict=True):
         shares = ((1.0 - asked.content, 1.0 - asked.confidence, -0.5),)
         shares += ((asked.content, asked.confidence, 0.5),)
@@ -316,23 +319,12 @@ def _each_model(
     return tuple(bounds)
 
 
-def _data(model: Model) -> Calibrated:
+def _data(model: Model) -> CalibrationSource:
     case = model.posterior.case
-    return Calibrated(
+    return CalibrationSource(
         gear=case.gear.name,
         theory=model.posterior.theory,
         name=case.name,
         rows=len(case.records.force),
         sha256=case.data_sha256,
     )
-
-
-def _warnings(found: Sequence[Model]) -> tuple[str, ...]:
-    """Return warnings on the noise of the most probable model."""
-    posterior = found[0].posterior
-    words = [fault.words for fault in residuals(posterior).noise]
-    rows = len(posterior.case.records.force)
-    alike = correlation_check(posterior.draws, rows)
-    if alike.outcome == "warning":
-        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
-    return tuple(words)

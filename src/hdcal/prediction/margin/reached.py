@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.prediction.conditions import NEAR_MM, Conditions
-from hdcal.prediction.margin.request import Request
+from hdcal.prediction.margin.request import MarginRequest
 from hdcal.prediction.margin.result import Reached
 from hdcal.prediction.members import over_draws
 from hdcal.prediction.models import Model
@@ -22,7 +22,7 @@ _NONE = 1e6
 
 
 def deformation_reached(
-    found: Sequence[Model], asked: Request, at: Conditions, warm: float
+    found: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
 ) -> Reached | None:
     """Return the deformation at which the members first need the given force.
 

@@ -1,4 +1,4 @@
-"""Request of a margin, and what is wrong with one."""
+"""MarginRequest of a margin, and what is wrong with one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ from hdcal.prediction.conditions import (
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
 from hdcal.prediction.models import Model
+from hdcal.prediction.population import Population, population_findings
 from hdcal.prediction.shares import share_findings
-from hdcal.prediction.simulate import Population, population_findings
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.quantities import Quantities
 
@@ -33,8 +33,8 @@ RULES: tuple[Rule, ...] = get_args(Rule)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
-    """Request of a margin; the attributes are those of `margin`.
+class MarginRequest:
+    """MarginRequest of a margin; the attributes are those of `margin`.
 
     Attributes:
         temperature: of the specimen [°C], (t,).
@@ -84,7 +84,7 @@ def _axes(given: object) -> int | None:
 
 def require_answerable(
     models: Sequence[Model],
-    asked: Request,
+    asked: MarginRequest,
     limit_force: float | None,
     rule: str | None,
 ) -> None:
@@ -147,7 +147,7 @@ def _deformation(
 
 
 def _forces(
-    main: Model, asked: Request, limit_force: float | None, units: Quantities
+    main: Model, asked: MarginRequest, limit_force: float | None, units: Quantities
 ) -> Iterator[Finding]:
     at, unit = asked.deformation, units.load_unit
     usual = abs(float(np.median(main.draws["stiffness"])) * at)
@@ -171,7 +171,7 @@ def _forces(
             yield Finding(name, words, remedy + units.displacement)
 
 
-def _choices(asked: Request, rule: str | None) -> Iterator[Finding]:
+def _choices(asked: MarginRequest, rule: str | None) -> Iterator[Finding]:
     for name, value, known in (
         ("quantity", asked.quantity, QUANTITIES),
         ("direction", asked.direction, DIRECTIONS),

@@ -11,8 +11,8 @@ from hdcal.prediction.conditions import Direction
 from hdcal.prediction.forces import Quantity
 from hdcal.prediction.margin.budget import BudgetRow
 from hdcal.prediction.margin.charts import budget_chart, force_chart
-from hdcal.prediction.margin.decision import Decision
-from hdcal.prediction.simulate import Population
+from hdcal.prediction.margin.decision import Conformity
+from hdcal.prediction.population import Population
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Count, Interval, Item, Probability, Words
 from hdcal.report.item import quantity as labelled
@@ -105,7 +105,7 @@ class ModelBound(Item):
     upper_bound_N: float = labelled("upper bound", "N")
 
 
-class Calibrated(Item):
+class CalibrationSource(Item):
     """Gear and data of the calibration."""
 
     gear: str
@@ -172,7 +172,7 @@ class Margin(Result):
     coverage_factor: float = labelled("coverage factor")
     expanded_uncertainty_N: float = labelled("expanded uncertainty", "N")
     budget: tuple[BudgetRow, ...]
-    decision: Decision | None
+    decision: Conformity | None
     reached: Reached | None
     models: tuple[ModelBound, ...]
     causes: dict[str, Probability]
@@ -181,7 +181,7 @@ class Margin(Result):
     interval: Share
     seed: Count
     versions: dict[str, str]
-    data: Calibrated
+    data: CalibrationSource
     posterior: InstanceOf[Posterior] = Field(exclude=True)
     bend_N: tuple[float, float] = Field(exclude=True)
     averaging: tuple[str, ...] = Field(exclude=True)
