@@ -6,7 +6,7 @@ from posteriors import ramp_case, regressed, single, with_leftover, written_post
 from slices import slice_of
 
 import hdcal
-from hdcal.prediction.extrapolation import FADE, SIZES, covariance, fit_bends
+from hdcal.prediction.extrapolation import FADE, SIZES, fit_bends
 
 ENDS = ("lo", "median", "hi")
 
@@ -17,14 +17,6 @@ def integrated(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     left = np.clip(one[:, None, None] - start, 0.0, None)
     right = np.clip(other[None, :, None] - start, 0.0, None)
     return np.trapezoid(left * right + (left * right) ** 2 / 4.0, start, axis=-1)
-
-
-def test_the_covariance_is_that_of_integrated_wiener_processes():
-    one, other = np.array([0.1, 0.5, 1.0, 1.8]), np.array([0.2, 1.0, 1.5])
-    expected = integrated(one, other)
-    np.testing.assert_allclose(covariance(one, other), expected, rtol=1e-3)
-    same = np.diag(integrated(one, one))
-    np.testing.assert_allclose(covariance(one, one, pairs=False), same, rtol=1e-3)
 
 
 def curved(seed: int = 3, rows: int = 20):
@@ -113,18 +105,6 @@ def test_bands_and_margin_agree():
 def width(posterior, at: float) -> float:
     found = hdcal.margin(posterior, at).worst.force_N
     return found.hi - found.lo
-
-
-def test_the_interval_is_wider_than_that_of_the_line_inside_and_more_beyond():
-    posterior = curved()[2]
-    draws = posterior.draws
-    more = []
-    for at in (0.27, 0.5, 0.7, 1.0):
-        line = draws["stiffness"] * at + draws["force_offset"]
-        low, high = np.quantile(line, [0.025, 0.975])
-        more.append(width(posterior, at) / (high - low))
-    assert all(share > 1.0 for share in more)
-    assert more[3] > more[2] > more[1] > 1.1
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-200])
