@@ -3,7 +3,6 @@
 import json
 import sys
 import time
-from dataclasses import replace
 from statistics import median
 
 from benchmarks.children import CASE, run, table
@@ -17,45 +16,32 @@ def main(repeats: int) -> None:
     child = run("-m", "benchmarks.designs", repeats)
     found = json.loads(child.output.splitlines()[-1])
     rows = [
-        (size, path, f"{median(times):.4f}", WANTED[size])
-        for size, paths in found.items()
-        for path, times in paths.items()
+        (size, f"{median(times):.4f}", WANTED[size]) for size, times in found.items()
     ]
-    table((f"{DRAWS} draws", "how", "hot, median [s]", "wanted [s]"), rows)
+    table((f"{DRAWS} draws", "hot, median [s]", "wanted [s]"), rows)
     print(f"\nPeak memory {child.peak_bytes / 2**30:.2f} GiB, wanted ≤ 2.")
 
 
 def measure(repeats: int) -> dict:
-    """Take turns between the shortcut, the general path and one with an effect."""
+    """Return the seconds of each turn by the number of designs."""
     import numpy as np
 
     from hdcal import read_case
-    from hdcal.design.design_draws import design_draws
-    from hdcal.design.study.force_quantiles import force_quantiles, general_quantiles
-    from hdcal.physics.effects.stiffness import ProgressiveStiffening
+    from hdcal.design.gears import draw_gears
+    from hdcal.design.study import force_quantiles
 
-    line = design_draws(read_case(CASE).gear, draws=DRAWS)
+    gears = draw_gears(read_case(CASE).gear, count=DRAWS)
     random = np.random.default_rng(0)
-    slope = {"progressive_stiffening.slope": random.normal(0.35, 0.05, DRAWS)}
-    effects = replace(line.problem, effects=(ProgressiveStiffening,))
-    bent = replace(line, problem=effects, values={**line.values, **slope})
-    paths = {
-        "no effects: one gear's quantiles, scaled": (force_quantiles, line),
-        "no effects: every draw on every design": (general_quantiles, line),
-        "an effect: every draw on every design": (force_quantiles, bent),
-    }
     found = {}
     for name, size in SIZES.items():
         factor, at = random.uniform(0.7, 1.4, size), random.uniform(0.3, 0.5, size)
         warm, shares = random.choice([20.0, 60.0], size), np.array([0.025, 0.5, 0.975])
-        times = {path: [] for path in paths}
+        found[name] = []
         for turn in range(repeats + 1):
-            for path, (quantiles, basis) in paths.items():
-                began = time.perf_counter()
-                quantiles(basis, factor, at, warm, shares)
-                if turn:
-                    times[path].append(time.perf_counter() - began)
-        found[name] = times
+            began = time.perf_counter()
+            force_quantiles(gears, at, warm, factor, shares)
+            if turn:
+                found[name].append(time.perf_counter() - began)
     return found
 
 

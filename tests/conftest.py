@@ -18,9 +18,8 @@ pytest_plugins = ["commands", "clusters"]
 _OWN = pytest.StashKey[str]()
 # Code that no trace holds: it reads, decides, writes or keeps the traces.
 _NEVER_TRACED = (
-    *("hdcal.cli", "hdcal.data", "hdcal.diagnosis", "hdcal.exported", "hdcal.report"),
-    *("hdcal.design.inverse_design.inverse_design", "hdcal.design.wave_generator"),
-    "hdcal.motion.loss",
+    *("hdcal.cli", "hdcal.data", "hdcal.design", "hdcal.diagnosis", "hdcal.exported"),
+    "hdcal.report",
 )
 _COMPILED_PLAINLY = (
     "--xla_backend_optimization_level=1 --xla_cpu_parallel_codegen_split_count=1 "

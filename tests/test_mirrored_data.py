@@ -62,7 +62,7 @@ def test_every_answer_is_mirrored(here: Hdcal, runs: dict[str, Path], tmp_path: 
         assert pulled == pytest.approx(-pressed, **NEAR)
     vary = "--vary=wall_thickness_mm=0.5:0.8"
     pressed, pulled = both("design", "--limit-force=±70", at, vary)
-    assert pulled["design"]["force_N"]["kept"] == pytest.approx(-70.0, rel=1e-5)
+    assert pulled["design"]["force_kept_N"] == pytest.approx(-70.0, rel=1e-5)
     wall = pressed["design"]["sizes_mm"]["wall_thickness"]
     assert pulled["design"]["sizes_mm"]["wall_thickness"] == pytest.approx(wall, **NEAR)
     pressed, pulled = both("study", at, "--vary=radius_mm=38,40,42")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hdcal.data.reading import read_case
     from hdcal.data.records import Geometry, Records
     from hdcal.design.inverse_design import inverse_design
-    from hdcal.design.study.study import study
+    from hdcal.design.study import study
     from hdcal.design.wave_generator import wave_generator
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.result import Diagnosis
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
     from hdcal.motion.dynamic_posterior import DynamicPosterior
-    from hdcal.motion.respond.respond import respond
+    from hdcal.motion.respond import respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
     from hdcal.physics.registry import EFFECTS
@@ -64,16 +64,16 @@ _HOMES = {
     "fit": "classical.fit",
     "fleet": "fleets.fleet",
     "force": "physics.chain",
-    "inverse_design": "design.inverse_design.inverse_design",
+    "inverse_design": "design.inverse_design",
     "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
     "predict": "prediction.bands.predict",
     "read_case": "data.reading",
     "residuals": "inference.residuals",
-    "respond": "motion.respond.respond",
-    "study": "design.study.study",
+    "respond": "motion.respond",
+    "study": "design.study",
     "summarise": "calibration.calibration",
-    "wave_generator": "design.wave_generator.wave_generator",
+    "wave_generator": "design.wave_generator",
 }
 
 __all__ = [*sorted(_HOMES)]

@@ -22,13 +22,12 @@ from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
 from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
-from hdcal.design.command import design
-from hdcal.design.study.command import study
+from hdcal.design.command import design, study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.fleets.command import fleet
 from hdcal.fleets.force.command import margin
-from hdcal.motion.respond.command import respond
+from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.report.plain import printable
 from hdcal.shared_causes.command import causes

@@ -9,29 +9,25 @@ from typing import Any
 
 # Class -> what makes a `report.result.Result` of it.
 RESULTS = {
+    "DynamicPosterior": "motion.dynamic_result.dynamic_calibration_of",
     "Posterior": "calibration.calibration.calibration_of",
     "Residuals": "calibration.residual_report.residual_report",
 }
 # Class of another result -> who tells of it.
 TELLERS = {
-    "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "NextForce": "fleets.force.document.force_document",
-    "Response": "motion.respond.summary.response_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
-    "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_table",
     "NextForce": "fleets.force.chart.bound_rows",
-    "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
 }
 # -> its chart.
 CHARTS = {
     "Fleet": "fleets.chart.fleet_chart",
     "NextForce": "fleets.force.chart.force_chart",
-    "Response": "motion.respond.chart.response_chart",
 }
 
 

@@ -24,7 +24,7 @@ from hdcal.inference.sample import check_settings
         (["design", "--window", ".4:.3"], "--window: 0.4:0.3 is empty"),
         (
             ["design", "--window", ".3:.4", "--spring-rate", "9:1"],
-            "--spring-rate: 9:1 is no range",
+            "--spring-rate: 9:1 is empty",
         ),
         (
             ["design", "--window", ".3:.4", "--temperature=-300:0"],
@@ -35,11 +35,11 @@ from hdcal.inference.sample import check_settings
                 *("design", "--limit-force", "9", "--vary", "radius_mm=38:42"),
                 *("--probability", "0.9"),
             ],
-            "--limit-force: no radius between 38 and 42 mm meets 9 N",
+            "--limit-force: nothing keeps 9 N",
         ),
         (
             ["study", "--vary", "radius_mm=38", "--material", "stel"],
-            "--material: unknown material 'stel'",
+            "stel.toml: unknown material",
         ),
         (
             ["respond", "--force", "step", "--draws", "3"],

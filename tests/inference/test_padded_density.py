@@ -18,8 +18,11 @@ from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.inference.values import predict_rows
-from hdcal.motion.dynamic_priors import dynamic_site_priors
-from hdcal.motion.dynamic_problem import build_dynamic, predict_motion
+from hdcal.motion.dynamic_problem import (
+    build_dynamic,
+    dynamic_site_priors,
+    predict_motion,
+)
 from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.

@@ -19,9 +19,7 @@ from hdcal.inference.residual_shapes import Structure
 from hdcal.notebook import RESULTS, TELLERS, Shown
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = sorted(
-    {*TELLERS, *RESULTS, "Bands", "Margin", "Case", "Diagnosis"} - {"DynamicPosterior"}
-)
+NAMES = sorted({*TELLERS, *RESULTS, "Bands", "Margin", "Case", "Diagnosis", "Response"})
 
 
 def test_every_public_result_is_shown():

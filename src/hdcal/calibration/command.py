@@ -60,7 +60,9 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     from hdcal.inference.sample import check_settings
 
     if dynamic:
-        from hdcal.motion.loss import loss_effects as choose_effects
+        from hdcal.motion.dynamic_calibration import (
+            friction_effects as choose_effects,
+        )
     else:
         from hdcal.calibration.calibrate import choose_effects
     with console.wrong as wrong:
@@ -110,11 +112,16 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
 def _dynamic(console: Console, case: "Case", settings: dict[str, Any]) -> int:
     """Calibrate a gear that moves, and return the exit code."""
     from hdcal.cli.progress import progress_bar
+    from hdcal.inference.posterior_file import FILE_NAME
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
-    from hdcal.motion.summary import dynamic_report
+    from hdcal.motion.dynamic_result import dynamic_calibration_of
 
-    # Without effects the data decide.
-    settings["effects"] = settings["effects"] or None
     with progress_bar() as progress:
         posterior = calibrate_dynamic(case, progress=progress, **settings)
-    return console.report(dynamic_report(posterior, console.command))
+    found = dynamic_calibration_of(posterior)
+    return console.show(
+        found,
+        figures=["motion"],
+        tables={"motion.csv": found.bands},
+        others={FILE_NAME: posterior.to_netcdf},
+    )

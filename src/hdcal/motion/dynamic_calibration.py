@@ -1,4 +1,4 @@
-"""Calibrate mass, damping and stiffness against a gear that was seen to move."""
+"""Calibration of mass, damping and stiffness from the record of a gear in motion."""
 
 import time
 from collections.abc import Sequence
@@ -6,11 +6,11 @@ from functools import partial
 
 import jax
 import numpy as np
+from scipy.special import chdtrc
 
 from hdcal.data.case import Case, Theory, require_case, require_force
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.exported import jit
-from hdcal.inference import laplace
 from hdcal.inference.assembly import (
     MOST_LOG_LIKELIHOODS,
     Specifics,
@@ -18,39 +18,33 @@ from hdcal.inference.assembly import (
     run_settings,
 )
 from hdcal.inference.checks import Check
-from hdcal.inference.sample import (
-    Draws,
-    Progress,
-    check_settings,
-    sample,
+from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.motion.dynamic_posterior import DynamicPosterior
+from hdcal.motion.dynamic_problem import (
+    DynamicProblem,
+    build_dynamic,
+    dynamic_site_priors,
+    motion_rows,
+    pointwise,
+    predict_motion,
 )
-from hdcal.motion.dynamic_posterior import LOSS, DynamicPosterior
-from hdcal.motion.dynamic_priors import dynamic_site_priors
-from hdcal.motion.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.motion.frequency_scan import scan
-from hdcal.motion.friction_search import motion_slopes
-from hdcal.motion.loss import (
-    WHITE,
-    WHITENESS,
-    Chosen,
-    choose_loss,
-    loss_effects,
-    noise_probability,
-)
+from hdcal.motion.mode_search import friction_peak, highest_peak
+from hdcal.physics.effect import Effect
+from hdcal.physics.effects.loops import CoulombFriction
 
 FEWEST_ROWS = 20
-_PEAKS = 3
-# A second peak of the density lower by less than this [nat] was wrongly left out.
-_RIVAL = 7.0
-# Peaks nearer than this, in posterior sds of the first, are one.
-_SAME = 5.0
+_WHITE, _RATE = "residuals are noise", "rows resolve the vibration"
+# Residuals with a smaller p value over so many lags are not white noise.
+_LEAST_P, _LAGS = 1e-3, 20
+_LEAST_PER_PERIOD = 6.0
+# Derived quantities whose chains must have mixed.
 _DERIVED = ("stiffness", "damping", "natural_frequency")
 
 
 def calibrate_dynamic(
     case: Case,
     *,
-    effects: Sequence[str] | None = None,
+    effects: Sequence[str] = (),
     theory: Theory | None = None,
     chains: int = 4,
     warmup: int = 1000,
@@ -61,12 +55,11 @@ def calibrate_dynamic(
     """Calibrate m ÿ + c ẏ + k y = F(t), or with dry friction, against a time series.
 
     The force is the input, as read and linear between the rows; the deformation is the
-    output, y plus a zero of its own plus white noise; k follows the temperature.
+    output, y plus an offset plus white noise; k follows the temperature.
 
     Args:
         case: from `read_case`; one run, with time.
-        effects: `coulomb_friction`, or none for the linear model; by default that one,
-            and the loss is named beside it where the record can tell.
+        effects: `coulomb_friction`, or none.
         theory: overrides the gear's theory.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain.
@@ -78,156 +71,125 @@ def calibrate_dynamic(
         The posterior; it may have failed its checks, see `Posterior.usable`.
 
     Raises:
-        InputError: the record or an effect is none that the model can be held against.
+        InputError: the record or an effect does not suit the model.
     """
     require_case(case)
     require_force(case, "calibrate with --dynamic")
     check_settings(chains, warmup, draws, seed)
-    loss_effects(effects or ())
-    check_motion(case)
-    began = time.perf_counter()
-    theory = theory or case.gear.theory
-    chosen, rival = _chosen(case, theory, effects)
-    problem, priors = chosen.problem, chosen.priors
+    acting = friction_effects(effects)
+    _check_record(case)
+    began, theory = time.perf_counter(), theory or case.gear.theory
+    priors = dynamic_site_priors(case, theory, acting)
+    problem = build_dynamic(case, dynamic_site_priors(case, theory), theory)
+    mode, rival = highest_peak(problem)
+    if acting:
+        linear, problem = problem, build_dynamic(case, priors, theory, acting)
+        mode = friction_peak(linear, mode, problem)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, chosen.whitening, seed, progress=progress, **size)
-    settings: dict[str, object] = {"seed": seed, **size, "with_gap": False}
-    own = _specifics(problem, found, (rival, *chosen.checks))
-    parts = assemble(case, priors, problem, found, own, seed)
-    settings |= run_settings(found, began)
-    settings |= {LOSS: chosen.probabilities} if chosen.probabilities else {}
-    return DynamicPosterior(case, theory, problem.effects, priors, *parts, settings)
+    sampled = sample(problem, mode, seed, progress=progress, **size)
+    specifics = _specifics(problem, sampled, rival)
+    parts = assemble(case, priors, problem, sampled, specifics, seed)
+    settings = {"seed": seed, **size, "with_gap": False, **run_settings(sampled, began)}
+    return DynamicPosterior(case, theory, acting, priors, *parts, settings)
 
 
-def _chosen(case: Case, theory: Theory, effects) -> tuple[Chosen, Check]:
-    """Return the model to sample, and the check that it has one natural frequency."""
-    linear = build_dynamic(case, dynamic_site_priors(case, theory), theory)
-    mode, rival = highest_peak(linear)
-    return choose_loss(case, theory, linear, mode, effects), rival
+def friction_effects(names: Sequence[str]) -> tuple[type[Effect], ...]:
+    """Look up the effects of a gear in motion: none, or dry friction.
+
+    Raises:
+        InputError: the model has no such effect.
+    """
+    if others := sorted({*names} - {CoulombFriction.name}):
+        words = f"the model of a moving gear does not hold '{', '.join(others)}'"
+        remedy = f"It holds {CoulombFriction.name} only: leave the others out"
+        raise InputError([Finding("effects", words, remedy)])
+    return (CoulombFriction,) if names else ()
 
 
-def _specifics(
-    problem: DynamicProblem, found: Draws, checks: Sequence[Check]
-) -> Specifics:
-    """Return what the model of the motion adds to what every calibration has."""
-    ratio = problem.priors["damping_ratio"]
-    undamped = ratio.family == "fixed" and float(ratio.numbers[0]) == 0.0
-    mixed = [name for name in _DERIVED if name != "damping" or not undamped]
+def _check_record(case: Case) -> None:
+    """Refuse records that are not the time series of one moving gear."""
+    records, rows = case.records, len(case.records.force)
+    late = np.flatnonzero(np.diff(records.time) <= 0.0)
+    with Findings() as wrong:
+
+        def find(problem: str, remedy: str) -> None:
+            wrong.append(Finding(case.name, problem, remedy))
+
+        if "time" not in records.known:
+            find("no column holds the time", "A moving gear needs one, such as time_s")
+        elif len(case.run_labels) > 1 or len(case.specimen_labels) > 1:
+            find("holds several runs or gears", "Calibrate one run of one gear")
+        elif late.size:
+            words = f"reading {late[0] + 2} is not later than the one before"
+            find(words, "Give each reading its time")
+        if rows < FEWEST_ROWS:
+            find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
+        if np.any(records.force_sd > 0.0):
+            remedy = "The force is taken as exact: leave it out"
+            find("gives an sd of the force", remedy)
+
+
+def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> Specifics:
+    """Return what the dynamic model adds to what every calibration has."""
+    place = np.unravel_index(np.argmin(sampled.potential), sampled.potential.shape)
+    best = {name: values[place] for name, values in sampled.values.items()}
+    free = [name for name, prior in problem.priors.items() if prior.family != "fixed"]
+    free = {name: best[name] for name in free if name != "deformation_sigma"}
+    slopes, sd = _slopes(problem, best, free), best["deformation_sigma"]
+    by_row = {}
+    if sampled.energy.size * problem.count <= MOST_LOG_LIKELIHOODS:
+        each = np.asarray(_pointwise(problem, sampled.values))
+        by_row["deformation"] = each[..., : problem.count]
     return Specifics(
-        log_likelihood=_log_likelihood(problem, found),
-        sensitivities=_slopes_in_sds(problem, found),
-        mixed={name: found.values[name] for name in mixed},
-        checks=[
-            *checks,
-            whiteness_check(problem, found),
-            sampling_rate_check(problem, found),
-        ],
+        log_likelihood=by_row,
+        sensitivities={
+            n: np.asarray(s)[: problem.count] / sd for n, s in slopes.items()
+        },
+        mixed={n: d for n in _DERIVED if np.ptp(d := sampled.values[n]) > 0.0},
+        checks=[rival, whiteness_check(problem, best), _rate_check(problem, best)],
         observed=("force", "deformation"),
     )
 
 
-def _log_likelihood(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
-    """Return the log likelihood by draw and row; nothing if they are many."""
-    if found.energy.size * problem.count > MOST_LOG_LIKELIHOODS:
-        return {}
-    each = np.asarray(_pointwise(problem, found.values))
-    return {"deformation": each[..., : problem.count]}
-
-
-def check_motion(case: Case) -> None:
-    """Refuse records that are no time series of one moving gear.
-
-    Raises:
-        InputError: with everything that is wrong.
-    """
-    records, findings = case.records, []
-
-    def find(problem: str, remedy: str) -> None:
-        findings.append(Finding(case.name, problem, remedy))
-
-    rows = len(records.force)
-    if "time" not in records.known:
-        find("no column holds the time", "A moving gear needs one, such as time_s")
-    elif len(case.run_labels) > 1 or len(case.specimen_labels) > 1:
-        find("holds several runs or gears", "Calibrate one run of one gear at a time")
-    elif np.any(np.diff(records.time) <= 0.0):
-        row = int(np.argmax(np.diff(records.time) <= 0.0)) + 2
-        find(
-            f"reading {row} is not later than the one before", "Give each its own time"
-        )
-    if rows < FEWEST_ROWS:
-        find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
-    if np.any(records.force_sd > 0.0):
-        find("gives an sd of the force", "The force is taken as exact: leave it out")
-    if findings:
-        raise InputError(findings)
-
-
-def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
-    """Search from every peak of the scan; return the highest, and check the next one.
-
-    Chains start around one peak and never cross to another, so that no R-hat would
-    show a second one.
-    """
-    fits = [laplace.fit(problem, start) for start in scan(problem, _PEAKS)]
-    fits = fits or [laplace.fit(problem)]
-    level = [float(laplace.potential(problem, fit.centre)) for fit in fits]
-    order = np.argsort(level)
-    best = fits[order[0]]
-    name = "one natural frequency explains the data"
-    inverse = np.linalg.inv(best.factor)
-    for index in order[1:]:
-        apart = [np.ravel(fits[index].centre[n] - best.centre[n]) for n in best.centre]
-        if np.linalg.norm(inverse @ np.concatenate(apart)) < _SAME:
-            continue
-        drop = level[index] - level[order[0]]
-        words = f"the next one is {drop:.0f} nat worse, {_RIVAL:g} are needed"
-        good = drop >= _RIVAL
-        return best, Check(name, "passed" if good else "failed", words)
-    return best, Check(name, "passed", "the search from several ends in one place")
+@jit
+def _slopes(problem: DynamicProblem, values, free):
+    return jax.jacfwd(lambda moved: predict_motion(problem, {**values, **moved}))(free)
 
 
 @jit
 def _pointwise(problem: DynamicProblem, values):
-    # Chains side by side, draws one after the other: all at once fill the memory.
+    # Draws of a chain one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)
 
 
-def _best_draw(found: Draws) -> dict[str, np.ndarray]:
-    """Return the draw of the highest posterior density."""
-    place = np.unravel_index(np.argmin(found.potential), found.potential.shape)
-    return {name: values[place] for name, values in found.values.items()}
-
-
-def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
-    """Warn where what is left over is no white noise: intervals are then too narrow."""
-    p = noise_probability(problem, _best_draw(found))
-    if p >= WHITE:
-        return Check(WHITENESS, "passed", f"no correlation over rows (p = {p:.2g})")
+def whiteness_check(problem: DynamicProblem, values) -> Check:
+    """Warn where residuals are correlated, by the test of Ljung and Box."""
+    read = np.asarray(problem.deformation)[: problem.count]
+    left = read - motion_rows(problem, values)
+    left, rows = left - left.mean(), len(left)
+    lags = np.arange(1, min(_LAGS, rows // 4) + 1)
+    power = max(float(left @ left), np.finfo(float).tiny)
+    share = np.array([left[lag:] @ left[:-lag] for lag in lags]) / power
+    p = chdtrc(len(lags), rows * (rows + 2) * np.sum(share**2 / (rows - lags)))
+    if p >= _LEAST_P:
+        return Check(_WHITE, "passed", f"no correlation over rows (p = {p:.2g})")
     model = "model with dry friction" if problem.effects else "linear model"
-    words = (
-        "what is left over is correlated from row to row "
-        f"(p = {p:.1g}): the {model} does not hold, the intervals are too narrow"
-    )
-    return Check(WHITENESS, "warning", words)
+    words = f"residuals are correlated from row to row (p = {p:.1g}): the {model} does "
+    return Check(_WHITE, "warning", words + "not hold, the intervals are too narrow")
 
 
-def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
-    """Warn where rows are too far apart for a force that is linear between them."""
-    name = "rows follow the vibration"
-    frequency = float(np.median(found.values["natural_frequency"]))
-    per_period = 1.0 / (
-        frequency * float(np.median(np.diff(problem.time[: problem.count])))
-    )
-    words = f"{per_period:.1f} rows per period of {frequency:.4g} Hz"
-    if per_period >= 6.0:
-        return Check(name, "passed", words)
-    remedy = "the force between rows is guessed as straight; sample faster"
-    return Check(name, "warning", f"{words}: {remedy}")
+def _rate_check(problem: DynamicProblem, values) -> Check:
+    """Check that the force may be taken as linear between the rows.
 
-
-def _slopes_in_sds(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
-    """Return by how much each parameter moves the measured rows, in noise sds."""
-    values = _best_draw(found)
-    sd = float(values["deformation_sigma"])
-    return {name: slope / sd for name, slope in motion_slopes(problem, values).items()}
+    The response with dry friction is wrong where a step is half a period or more.
+    """
+    steps = np.diff(problem.time[: problem.count]) * float(values["natural_frequency"])
+    words = f"{1.0 / np.median(steps):.1f} rows per period"
+    if problem.effects and np.max(steps) >= 0.5:
+        remedy = "leave coulomb_friction out"
+        words = f"rows are up to {np.max(steps):.2g} periods apart: {remedy}"
+        return Check(_RATE, "failed", words)
+    if np.median(steps) * _LEAST_PER_PERIOD <= 1.0:
+        return Check(_RATE, "passed", words)
+    remedy = "the force between rows is taken as straight; sample faster"
+    return Check(_RATE, "warning", f"{words}: {remedy}")

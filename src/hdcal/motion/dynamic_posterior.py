@@ -1,4 +1,4 @@
-"""The calibrated posterior of a moving gear."""
+"""The calibrated posterior of a gear in motion."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -8,27 +8,22 @@ from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
-from hdcal.motion.dynamic_priors import dynamic_sites
 from hdcal.motion.dynamic_problem import DynamicProblem, build_dynamic
-
-# The setting with the probability of each model of the loss.
-LOSS = "loss"
 
 
 class DynamicPosterior(Posterior):
     """A dynamic calibration: draws in code units, priors, checks and provenance.
 
-    It knows mass, damping, stiffness and dry friction, and nothing of the zero of the
-    force or of other effects: forces are predicted from a calibration of the gear at
-    rest.
+    It has no offset of the force and no effect but dry friction: forces are predicted
+    from a calibration at rest.
     """
 
     kind: ClassVar[str] = "dynamic"
 
     @property
     def sites(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each parameter that a draw holds."""
-        return dict.fromkeys(dynamic_sites(self.case, self.effects), ())
+        """Shape of each parameter of a draw."""
+        return dict.fromkeys(self.priors, ())
 
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
@@ -37,19 +32,10 @@ class DynamicPosterior(Posterior):
 
     @cached_property
     def problem(self) -> Problem:
-        """Raise: there is no model of the force as read.
-
-        Raises:
-            InputError: always.
-        """
-        words = "this is a calibration of the moving gear, which knows no force zero"
+        """Raise `InputError`, as there is no model of the force as read."""
+        words = "this is a calibration of the moving gear, without a force offset"
         remedy = "Take one of the gear at rest, or ask how the gear responds"
         raise InputError([Finding(self.case.name, words, remedy)])
-
-    @property
-    def loss(self) -> Mapping[str, float]:
-        """Probability of each model of the loss; empty where they were not weighed."""
-        return self.settings.get(LOSS, {})
 
     @cached_property
     def moving(self) -> DynamicProblem:

@@ -12,6 +12,7 @@ contact. No speed enters, so slow motions stick and slip as fast ones do.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -33,6 +34,8 @@ STUCK = 1.0 / 400.0
 # effect of `STUCK`.
 _SMOOTH, _STICKING = (1e-9, 1e-11), (1e-6, 1e-8)
 MOST_STEPS = 2_000_000
+# Parts of the time between two answers in which the largest deformation is looked for.
+_BETWEEN = 16
 
 
 def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Scalar:
@@ -150,12 +153,30 @@ def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
     return damping / (2.0 * jnp.sqrt(stiffness * mass))
 
 
+class Motion(NamedTuple):
+    """A motion over time.
+
+    Attributes:
+        deformation: at the times [mm].
+        speed: at the times [mm/s].
+        largest: largest size of the deformation, also between the times [mm].
+        done: whether the integration came to its end within the number of steps.
+        gone: whether it ended at the reach.
+    """
+
+    deformation: Float[Array, " n"]
+    speed: Float[Array, " n"]
+    largest: Float[Array, ""]
+    done: Float[Array, ""]
+    gone: Float[Array, ""]
+
+
 def integrate(
     oscillator: Oscillator,
     force: Forcing,
     times: Float[Array, " n"],
     reach: Scalar = jnp.inf,
-) -> tuple[Float[Array, "n 2"], Float[Array, ""], Float[Array, ""]]:
+) -> Motion:
     """Integrate the equation of motion from rest and zero deformation.
 
     Time is counted in radians of the natural frequency and speed in the deformation
@@ -167,11 +188,6 @@ def integrate(
         times: increasing [s]; motion begins at the first.
         reach: deformation at which the integration ends [mm]: a gear that gives way
             there accelerates without end.
-
-    Returns:
-        Deformation [mm] and speed [mm/s] at the times, whether the integration came
-        to its end within the allowed number of steps, and whether it ended at the
-        reach.
     """
     # Half a second, which only motion needs.
     import diffrax
@@ -210,10 +226,26 @@ def integrate(
         event=diffrax.Event(lambda t, y, args, **_: jnp.abs(y[0]) * size > reach),
         throw=False,
     )
-    states = jnp.asarray(found.ys)[:, :2] * jnp.stack([size, size * pace])
+    deformation, speed = jnp.asarray(found.ys)[:, :2].T
+    deformation, speed = deformation * size, speed * size * pace
     done = found.result == diffrax.RESULTS.successful
+    done &= jnp.all(jnp.isfinite(deformation) & jnp.isfinite(speed))
     gone = found.result == diffrax.RESULTS.event_occurred
-    return states, done & jnp.all(jnp.isfinite(states)), gone
+    largest = _largest(times, deformation, speed)
+    return Motion(deformation, speed, largest, done, gone)
+
+
+def _largest(times, deformation, speed) -> Float[Array, ""]:
+    """Return the largest size, by the cubic through deformations and speeds."""
+    step, share = jnp.diff(times), jnp.linspace(0.0, 1.0, _BETWEEN + 1)[:, None]
+    (y, end), slope, slope_end = (
+        (deformation[:-1], deformation[1:]),
+        step * speed[:-1],
+        step * speed[1:],
+    )
+    left = (1.0 - share) ** 2 * (y * (1.0 + 2.0 * share) + slope * share)
+    right = share**2 * (end * (3.0 - 2.0 * share) - slope_end * (1.0 - share))
+    return jnp.max(jnp.abs(left + right))
 
 
 def _slip(oscillator: Oscillator, size: Scalar) -> Float[Array, ""]:

@@ -21,6 +21,10 @@ class Forcing(eqx.Module, ABC):
     def largest(self) -> Scalar:
         """Return the largest absolute force [N]."""
 
+    @abstractmethod
+    def words(self) -> str:
+        """Return the force in words."""
+
     def corners(self) -> Float[Array, " c"] | None:
         """Return the times at which the slope of the force jumps [s], or None."""
         return None
@@ -40,6 +44,9 @@ class Step(Forcing):
 
     def largest(self) -> Scalar:
         return jnp.abs(self.amplitude)
+
+    def words(self) -> str:
+        return f"a step of {self.amplitude:g} N"
 
 
 class Chirp(Forcing):
@@ -65,6 +72,12 @@ class Chirp(Forcing):
     def largest(self) -> Scalar:
         return jnp.abs(self.amplitude)
 
+    def words(self) -> str:
+        if self.first == self.last:
+            return f"a sine of {self.amplitude:g} N at {self.first:g} Hz"
+        ends = f"from {self.first:g} to {self.last:g} Hz"
+        return f"a sweep of {self.amplitude:g} N {ends}"
+
 
 class SampledForce(Forcing):
     """A sampled force: linear between the rows, constant beyond them.
@@ -82,6 +95,9 @@ class SampledForce(Forcing):
 
     def largest(self) -> Scalar:
         return jnp.max(jnp.abs(self.force))
+
+    def words(self) -> str:
+        return f"a sampled force of {len(self.time)} rows, linear between them"
 
     def corners(self) -> Float[Array, " c"]:
         return jnp.asarray(self.time)

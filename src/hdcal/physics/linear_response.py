@@ -19,8 +19,6 @@ from hdcal.physics.theory import Scalar
 State = tuple[Scalar, Scalar]
 # Below this |x| the functions of √x are summed as series, smooth through zero.
 _SMALL = 1e-4
-# Longer records are computed in stretches of so many steps, to bound the memory.
-_STRETCH = 16_384
 
 
 def _cosine(x):
@@ -104,14 +102,9 @@ def linear_response(
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
     """
-    if len(time) > 2 * _STRETCH:
-        return _in_stretches(gear, time, force, start)
-    return jnp.concatenate([start[None], _advance(gear, time, force, start)])
 
-
-def _advance(gear: LinearGear, time, force, start) -> Float[Array, "n-1 2"]:
-    """Return the states at all rows but the first."""
-
+    # A gradient recomputes each step, which takes less memory than to keep it.
+    @jax.checkpoint
     def advance(state, step):
         matrix, gain = step
         free = applied(matrix, state)
@@ -119,32 +112,43 @@ def _advance(gear: LinearGear, time, force, start) -> Float[Array, "n-1 2"]:
         return state, jnp.stack(state)
 
     steps = whole_steps(gear, time, force)
-    return jax.lax.scan(advance, (start[0], start[1]), steps)[1]
+    _, states = jax.lax.scan(advance, (start[0], start[1]), steps)
+    return jnp.concatenate([start[None], states])
 
 
-def _in_stretches(gear: LinearGear, time, force, start) -> Float[Array, "n 2"]:
-    """Return all states, stretch after stretch.
+def fit_linear(
+    place: Float[Array, "2"],
+    time: Float[Array, " n"],
+    force: Float[Array, " n"],
+    read: Float[Array, " n"],
+    weight: Float[Array, " n"],
+    stiffness: Scalar | Float[Array, " n-1"],
+) -> tuple[Float[Array, ""], Float[Array, "4"]]:
+    """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and offset of the best fit.
 
-    A gradient recomputes each stretch: it keeps the states only, instead of some
-    thirty numbers per row.
+    At a given frequency and damping ratio the readings are linear in these.
+
+    Args:
+        place: natural frequency [Hz] and damping ratio.
+        time: increasing [s].
+        force: at the rows [N], linear between them.
+        read: deformation [mm].
+        weight: of each row, 0 or 1.
+        stiffness: of all steps, or of each, over its mean k.
     """
-    steps = len(time) - 1
-    count = -(-steps // _STRETCH)
-    spare = count * _STRETCH - steps
-    stiffness = jnp.broadcast_to(gear.stiffness, steps)
-    stiffness = jnp.pad(stiffness, (0, spare), mode="edge")
-    beyond = jnp.arange(1, spare + 1) * (time[-1] - time[-2])
-    time = jnp.concatenate([time, time[-1] + beyond])
-    force = jnp.pad(force, (0, spare), mode="edge")
-    rows = jnp.arange(count)[:, None] * _STRETCH + jnp.arange(_STRETCH + 1)
-
-    @jax.checkpoint
-    def stretch(state, part):
-        stiffness, time, force = part
-        here = gear._replace(stiffness=stiffness)
-        states = _advance(here, time, force, state)
-        return states[-1], states
-
-    parts = stiffness.reshape(count, _STRETCH), time[rows], force[rows]
-    _, states = jax.lax.scan(stretch, start, parts)
-    return jnp.concatenate([start[None], states.reshape(-1, 2)[:steps]])
+    # A mass of one over ω² has a mean stiffness of one.
+    pace = 2.0 * jnp.pi * place[0]
+    gear = LinearGear(pace**-2, 2.0 * place[1] / pace, stiffness)
+    forces = jnp.zeros((3, len(time))).at[0].set(force)
+    starts = jnp.zeros((3, 2)).at[1, 0].set(1.0).at[2, 1].set(pace)
+    moved = jax.vmap(linear_response, (None, None, 0, 0))
+    columns = moved(gear, time, forces, starts)[..., 0]
+    columns = weight * jnp.append(columns, jnp.ones((1, len(time))), axis=0)
+    size = jnp.linalg.norm(columns, axis=1) + 1e-300
+    design = columns / size[:, None]
+    normal = design @ design.T + 1e-10 * jnp.eye(4)
+    found = jnp.linalg.solve(normal, design @ (weight * read))
+    left = weight * read - found @ design
+    fitted = found / size * jnp.array([1.0, 1.0, pace, 1.0])
+    # A gear gives way in the direction of the force.
+    return jnp.where(fitted[0] > 0.0, left @ left, jnp.inf), fitted

@@ -118,10 +118,15 @@ class PosteriorResult(Result):
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """The stiffness as read, which is no parameter, and the parameters."""
-        unit = self.units.stiffness_unit
-        stiffness = Quantity(**self.stiffness_N_per_mm.model_dump(), unit=unit)
-        return {"stiffness": stiffness, **self.parameters}
+        """The intervals of the result, such as the stiffness, and the parameters."""
+        derived = {}
+        for name in type(self).model_fields:
+            if isinstance(one := getattr(self, name), Interval):
+                unit = self._extra(name, "unit")
+                suffix = unit.replace("/", "_per_").replace("·", "_")
+                named = {**one.model_dump(), "unit": self.units.unit(unit) or "1"}
+                derived[name.removesuffix(f"_{suffix}")] = Quantity(**named)
+        return {**derived, **self.parameters}
 
     @property
     def measured(self) -> Mapping[str, ParameterEstimate]:

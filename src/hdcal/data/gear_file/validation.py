@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean
 from hdcal.data.plausible import out_of_range, range_of
-from hdcal.errors import InputError
+from hdcal.errors import Finding, InputError
 
 M = TypeVar("M", bound=BaseModel)
 STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
@@ -86,3 +86,26 @@ def _words(error: dict, name: str, model: Any, place: list[str]) -> tuple[str, s
         return f"unknown choice '{value}'", did_you_mean(value, known)
     words = error["msg"][:1].lower() + error["msg"][1:]
     return words, f"Write it like {example}"
+
+
+def requested(kind: type[M], context: Any, **given: Any) -> M:
+    """Return the request that parameters make.
+
+    Args:
+        kind: of the request.
+        context: of its validators.
+        given: parameters by name.
+
+    Raises:
+        InputError: holds everything that is wrong with them.
+    """
+    try:
+        return kind.model_validate(given, context=context)
+    except ValidationError as error:
+        faults = error.errors()
+    findings = []
+    for one in faults:
+        place = [str(part) for part in one["loc"]]
+        problem, remedy = _words(dict(one), place[0], kind, place)
+        findings.append(Finding(place[0], problem, remedy))
+    raise InputError(dict.fromkeys(findings))

@@ -1,0 +1,262 @@
+"""Inverse design: the sizes that keep a force limit, with the least change.
+
+Of all sizes inside their bounds with
+
+    F ≤ limit and stress ≤ strength, each with the required probability,
+
+the ones nearest to the tested gear are chosen: least Σ (ln x/x₀)², since K was found
+there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, InstanceOf, ValidationInfo, field_validator
+
+from hdcal.data.case import Gear
+from hdcal.data.gear_file.validation import fault, requested, within
+from hdcal.design import request
+from hdcal.design.charts import limit_chart
+from hdcal.design.gear_forces import Models
+from hdcal.design.gears import Gears, Sizes, draw_gears
+from hdcal.design.nearest_point import CLOSE, nearest_kept
+from hdcal.design.result import DesignResult, Stress, shared_fields
+from hdcal.errors import Finding, Findings, InputError
+from hdcal.report.chart_spec import Chart
+from hdcal.report.item import Interval, Probability, quantity
+
+# A limit this many times larger or smaller than the force is a slip of the unit.
+_OFF = 100.0
+
+Force = Annotated[float, within("force")]
+Strength = Annotated[float, within("limit_stress")]
+
+
+class LimitAsked(request.Asked):
+    """The request for an inverse design; limits are sizes, forces have a sign."""
+
+    deformation_mm: request.NominalDeformation = Field(validation_alias="deformation")
+    limit_force_N: Force = Field(validation_alias="limit_force")
+    limit_stress_MPa: Strength | None = Field(validation_alias="limit_stress")
+    bounds: dict[request.SizeName, request.Bounds] = Field(validation_alias="vary")
+
+    @property
+    def sense(self) -> int:
+        """Sense of loading: +1 where the gear is pressed, −1 where it is pulled."""
+        return -1 if self.deformation_mm < 0.0 else 1
+
+    @field_validator("limit_force_N")
+    @classmethod
+    def _check_limit(cls, limit: float, info: ValidationInfo) -> float:
+        gears, at = request.gears_of(info), info.data.get("deformation_mm", 0.0)
+        usual = abs(np.median(gears.forces([at], [gears.gear.reference_temperature])))
+        if limit < 0.0 < at or not usual / _OFF <= abs(limit) <= usual * _OFF:
+            words = f"{limit:g} N is no limit where {at:g} mm takes about {usual:.3g} N"
+            raise fault(words, "Give it in N, with the sign of the deformation")
+        return abs(limit)
+
+    @field_validator("bounds")
+    @classmethod
+    def _check_bounds(cls, bounds: dict, info: ValidationInfo) -> dict:
+        at = info.data.get("deformation_mm", 0.0)
+        request.check_sizes(request.gears_of(info), bounds, at)
+        return bounds
+
+
+class Candidate(Stress):
+    """One material with the sizes that were found best for it.
+
+    The distance is √Σ (ln x/x₀)². What is kept is not exceeded with the required
+    probability; without a known strength no share of the stress is kept.
+    """
+
+    material: str = quantity("material")
+    sizes_mm: dict[str, float] = quantity("sizes", "mm")
+    met: bool = quantity("limits kept")
+    change: float = quantity("distance from the tested gear")
+    force_N: Interval = quantity("force", "N")
+    force_kept_N: float = quantity("force kept", "N")
+    probability: Probability = quantity("probability of keeping the limit")
+    utilisation_kept: float | None = quantity("share of the allowed stress kept")
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Sizes [mm] by name with the unit, such as `radius_mm`."""
+        return {f"{name}_mm": value for name, value in self.sizes_mm.items()}
+
+    def columns(self) -> dict[str, Any]:
+        """Return numbers and texts by the names of columns, the sizes among them."""
+        return super().columns() | self.sizes
+
+
+@dataclass(frozen=True)
+class LimitedGears:
+    """The next gears of one material at the worst temperature, and their limits."""
+
+    gears: Gears
+    asked: LimitAsked
+
+    def forces(self, sizes: Sizes) -> np.ndarray:
+        """Return the largest force over the temperatures of each draw [N]."""
+        levels, at = self.asked.temperature_C, abs(self.asked.deformation_mm)
+        factor = self.gears.factor(sizes)
+        return self.gears.forces([at] * len(levels), levels, factor).max(axis=0)
+
+    def stresses(self, sizes: Sizes) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the largest stress of each draw [MPa], and its share of the limit."""
+        at, limit = abs(self.asked.deformation_mm), self.asked.limit_stress_MPa
+        stress = self.gears.stresses(sizes, at, self.asked.temperature_C)
+        strength = self.gears.strengths() if limit is None else limit
+        return stress, None if strength is None else stress / strength
+
+    def kept(self, values: np.ndarray) -> float:
+        """Return what is not exceeded with at least the required probability."""
+        rank = ceil(self.asked.probability * len(values) - 1e-9) - 1
+        return float(np.partition(values, rank)[rank])
+
+    def excess(self, sizes: Sizes) -> np.ndarray:
+        """Return logarithms of the kept force and stress over what is allowed."""
+        force = self.kept(self.forces(sizes)) / self.asked.limit_force_N
+        _, used = self.stresses(sizes)
+        return np.log([force] if used is None else [force, self.kept(used)])
+
+    def candidate(self, sizes: Mapping[str, float]) -> Candidate:
+        """Return force, stress and probability of given sizes [mm]."""
+        gears, sense, least = self.gears, self.asked.sense, 0.5 / self.gears.independent
+        forces, (stress, used) = self.forces(sizes), self.stresses(sizes)
+        steps = [np.log(value / gears.size_of(name)) for name, value in sizes.items()]
+        kept = forces <= self.asked.limit_force_N * (1.0 + CLOSE)
+        return Candidate(
+            **dict(Stress.of(gears, stress)),
+            material=gears.material,
+            sizes_mm={name.removesuffix("_mm"): value for name, value in sizes.items()},
+            met=bool(np.max(self.excess(sizes)) <= CLOSE),
+            change=float(np.linalg.norm(steps)),
+            force_N=Interval.of(sense * forces),
+            force_kept_N=sense * self.kept(forces),
+            probability=float(np.clip(np.mean(kept), least, 1.0 - least)),
+            utilisation_kept=None if used is None else self.kept(used),
+        )
+
+    def best(self) -> Candidate:
+        """Return the sizes that keep the limits with the least change."""
+        names, bounds = [*self.asked.bounds], [*self.asked.bounds.values()]
+
+        def sizes(logs: np.ndarray) -> dict[str, float]:
+            return dict(zip(names, map(float, np.exp(logs)), strict=True))
+
+        start = np.log([self.gears.size_of(name) for name in names])
+        if names:
+            bounds = np.log(bounds)
+            start = nearest_kept(lambda y: self.excess(sizes(y)), start, bounds)
+        return self.candidate(sizes(start))
+
+
+class InverseDesign(DesignResult):
+    """The sizes that keep the limits with the least change.
+
+    Attributes:
+        design: the candidate nearest to the tested gear.
+        candidates: the best sizes of each material.
+        target: the gears of the chosen material, and their limits.
+    """
+
+    template = "design/inverse_design.md.j2"
+    table = "candidates"
+
+    format: Literal["hdcal.design/1"] = "hdcal.design/1"
+    kind: Literal["inverse_geometry"] = "inverse_geometry"
+    asked: LimitAsked
+    design: Candidate
+    tested: Candidate
+    candidates: tuple[Candidate, ...]
+    target: InstanceOf[LimitedGears] = Field(exclude=True)
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return force against limit if sizes are free."""
+        return {"design": limit_chart(self)} if self.asked.bounds else {}
+
+
+def inverse_design(
+    source: Models | Gear | Gears,
+    vary: Mapping[str, tuple[float, float]],
+    limit_force: float,
+    *,
+    deformation: float | None = None,
+    temperatures: Sequence[float] | None = None,
+    probability: float = 0.99,
+    materials: Sequence[str] = (),
+    limit_stress: float | None = None,
+    tolerances: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> InverseDesign:
+    """Find the sizes nearest to the tested gear that keep a force limit.
+
+    Args:
+        source: a calibration; or a gear, to use its priors.
+        vary: lowest and highest value of each free size [mm]: wall_thickness_mm,
+            radius_mm, length_mm, load_height_mm.
+        limit_force: not to be exceeded [N]: its size, or with the force's sign.
+        deformation: radial, of the gear [mm]; negative where it is pulled; by default
+            the gear's nominal one.
+        temperatures: at all of which the limits hold [°C]; by default the reference.
+        probability: with which the next gear keeps each limit.
+        materials: names or .toml files to choose among; by default the gear's own.
+        limit_stress: largest hoop bending stress [MPa]; by default the material's
+            yield strength where that is known.
+        tolerances: ± of sizes [mm] by name; sizes are uniform within them.
+        seed: of scatter and priors.
+
+    Raises:
+        NotUsable: the calibration failed its checks.
+        InputError: invalid input, or nothing inside the bounds keeps the limits.
+    """
+    tested = draw_gears(source, seed)
+    with Findings() as wrong:
+        if not vary and not materials:
+            words, remedy = "nothing may change", "Free a size or name materials"
+            wrong.append(Finding("vary", words, remedy))
+        listed = materials or [tested.material]
+        made = [wrong.attempt(tested.of_material, name, seed) for name in listed]
+        asked = requested(
+            LimitAsked,
+            tested,
+            deformation=deformation,
+            limit_force=limit_force,
+            limit_stress=limit_stress,
+            vary=dict(vary),
+            temperatures=temperatures,
+            probability=probability,
+            tolerances=dict(tolerances or {}),
+        )
+    scatter = asked.tolerances_mm, seed, asked.sense
+    targets = [LimitedGears(one.next_ones(*scatter), asked) for one in made if one]
+    own = LimitedGears(tested.next_ones(*scatter), asked)
+    candidates = [target.best() for target in targets]
+    kept = [pair for pair in zip(candidates, targets, strict=True) if pair[0].met]
+    if not kept:
+        raise InputError([_unmet(candidates, asked)])
+    design, target = min(kept, key=lambda pair: pair[0].change)
+    place = asked.deformation_mm, asked.temperature_C, design.sizes
+    return InverseDesign(
+        **shared_fields(own.gears, *place),
+        materials=(design.material,),
+        asked=asked,
+        design=design,
+        tested=own.candidate({name: tested.size_of(name) for name in asked.bounds}),
+        candidates=tuple(candidates),
+        target=target,
+    )
+
+
+def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
+    best = min(found, key=lambda one: abs(one.force_kept_N))
+    at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
+    words = f"nothing keeps {asked.limit_force_N:g} N with probability "
+    words += f"{asked.probability:g}: the best ({at or best.material}) gives "
+    words += f"{best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
+    remedy = "Widen the bounds, free another size, or allow more force or stress"
+    return Finding("limit_force", words, remedy)

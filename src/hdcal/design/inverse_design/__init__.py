@@ -1,1 +1,0 @@
-"""Which sizes keep a limit of the force?"""

@@ -1,0 +1,123 @@
+"""Limits of requests, and what is impossible for a gear: the context of validation."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+
+from hdcal.data.gear_file.validation import fault, within
+from hdcal.design.gear_forces import SIZES, matters
+from hdcal.design.gears import Gears
+from hdcal.report.item import Item
+
+# More than this loss of Young's modulus is a slip of the unit [-].
+_MOST_LOSS = 0.5
+# Draws that have to fall outside for a probability to be estimated.
+_LEAST_OUTSIDE = 10
+
+
+def gears_of(info: ValidationInfo) -> Gears:
+    """Return the gears for which a request is validated."""
+    gears: Any = info.context
+    return gears
+
+
+def _nominal(given: Any, info: ValidationInfo) -> Any:
+    nominal = gears_of(info).gear.nominal_deformation
+    if given is not None:
+        return given
+    if nominal is None:
+        words = "the gear file names no nominal deformation"
+        raise fault(words, "Give one in mm, such as 0.4")
+    # The gear file states it as read.
+    return nominal * gears_of(info).radial_per_read
+
+
+def _possible(temperature: float, info: ValidationInfo) -> float:
+    gears = gears_of(info)
+    rise = abs(temperature - gears.gear.reference_temperature)
+    if np.median(gears.values["alpha"]) * rise >= _MOST_LOSS:
+        words = "the linear change of E with T would lose half of Young's modulus"
+        raise fault(words, "Give it in °C")
+    return temperature
+
+
+def _with_reference(given: Any, info: ValidationInfo) -> list[float]:
+    reference = gears_of(info).gear.reference_temperature
+    levels = [reference] if given is None or not len(given) else list(given)
+    inside = min(levels) < reference < max(levels)
+    return sorted({*map(float, levels), *([reference] if inside else [])})
+
+
+def _countable(probability: float, info: ValidationInfo) -> float:
+    size = gears_of(info).independent
+    if (1.0 - probability) * size < _LEAST_OUTSIDE * (1.0 - 1e-9):
+        words = f"{probability:g} cannot be estimated from {size:.0f} independent draws"
+        most = 1.0 - _LEAST_OUTSIDE / size
+        raise fault(words, f"Ask for {most:.4g} or less, or calibrate with more draws")
+    return probability
+
+
+def _of_sizes(tolerances: dict, info: ValidationInfo) -> dict:
+    for name, width in tolerances.items():
+        size = gears_of(info).size_of(name)
+        if not 0.0 < width < 0.5 * size:
+            words = f"{name} = {width:g} is no tolerance of {size:g} mm"
+            raise fault(words, "Give the ± part in mm, such as 0.02")
+    return tolerances
+
+
+def ascending(ends: tuple[float, float]) -> tuple[float, float]:
+    """Require two ends in ascending order."""
+    if not ends[0] < ends[1]:
+        raise fault(f"{ends[0]:g}:{ends[1]:g} is empty", "Write LO:HI")
+    return ends
+
+
+SizeName = Literal["wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm"]
+Size = Annotated[float, within("size")]
+Bounds = Annotated[tuple[Size, Size], AfterValidator(ascending)]
+# Radial, of the gear itself [mm].
+Deformation = Annotated[float, within("deformation")]
+NominalDeformation = Annotated[Deformation, BeforeValidator(_nominal)]
+Window = Annotated[tuple[Deformation, Deformation], AfterValidator(ascending)]
+Temperature = Annotated[float, within("temperature"), AfterValidator(_possible)]
+_Levels = Annotated[
+    tuple[Temperature, ...], BeforeValidator(_with_reference), Field(max_length=1000)
+]
+_Probability = Annotated[float, within("probability"), AfterValidator(_countable)]
+_Tolerance = Annotated[float, within("tolerances")]
+_Tolerances = Annotated[dict[SizeName, _Tolerance], AfterValidator(_of_sizes)]
+
+
+class Asked(Item):
+    """A request for gears that hold at all temperatures, with a probability."""
+
+    temperature_C: _Levels = Field(validation_alias="temperatures")
+    probability: _Probability
+    tolerances_mm: _Tolerances = Field(validation_alias="tolerances")
+
+
+def check_sizes(gears: Gears, sizes: Mapping[Any, Any], deformation: Any) -> None:
+    """Require sizes [mm], by name, that are possible in every combination.
+
+    Raises:
+        PydanticCustomError: they are not, or a deformation [mm] reaches the radius.
+    """
+    for name in sizes:
+        if not matters(SIZES[name], gears.gear.geometry, gears.theory):
+            words = f"{name} changes nothing under the theory '{gears.theory}'"
+            raise fault(words, "Leave it out, or use the theory cup")
+    least, most = (
+        {name: float(end(sizes.get(name, gears.size_of(name)))) for name in SIZES}
+        for end in (np.min, np.max)
+    )
+    if most["wall_thickness_mm"] >= least["radius_mm"]:
+        raise fault("a wall that is not thinner than the radius", "Check both sizes")
+    if "load_height_mm" in sizes and most["load_height_mm"] > least["length_mm"]:
+        words = "a load beyond the length of the gear"
+        raise fault(words, "Measure the load height from the closed base")
+    if np.max(np.abs(deformation)) >= least["radius_mm"]:
+        words = f"the deformation reaches the radius of {least['radius_mm']:g} mm"
+        raise fault(words, "Give it in mm")

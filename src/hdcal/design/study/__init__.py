@@ -1,1 +1,0 @@
-"""How does the force depend on the sizes?"""

@@ -1,1 +1,0 @@
-"""How does a calibrated gear move under a force?"""
