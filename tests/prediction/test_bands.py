@@ -15,13 +15,13 @@ from posteriors import (
 )
 from rigs import cycles, make_case, make_records
 from schema_checks import obeys
-from short import SHORT
 
 import hdcal
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.prediction.bands import predict as module
-from hdcal.prediction.bands.predict import Bands, default_bands, predict
+from hdcal.prediction.bands.predict import default_bands, predict
+from hdcal.prediction.bands.result import Bands
 from hdcal.prediction.conditions import is_tested
 
 
@@ -53,17 +53,6 @@ def test_bands_follow_deformation_temperature_and_direction(rubbing):
     true = 205.0 * 0.4 - 1.0 + 2.0
     assert up.physics_lo_N[1] < true < up.physics_hi_N[1]
     assert up.mean_N.median == up.physics_median_N[0]
-
-
-def test_a_new_reading_covers_new_data(rubbing):
-    records = cycles(960)
-    rows = (np.asarray(records.sense) > 0) & (records.temperature == 20.0)
-    found = predict(rubbing, np.asarray(records.deformation)[rows], [20.0])
-    assert np.all(found.new_measurement_lo_N < found.physics_lo_N)
-    assert np.all(found.new_measurement_hi_N > found.physics_hi_N)
-    fresh = reading(records, seed=9)[rows]
-    hits = (found.new_measurement_lo_N < fresh) & (fresh < found.new_measurement_hi_N)
-    assert 0.88 < hits.mean() <= 1.0
 
 
 def test_a_new_reading_has_the_quantiles_of_the_mixture():
@@ -152,17 +141,6 @@ def test_many_temperatures_are_shown_at_three_and_a_room_at_one():
         assert np.unique(found.temperature_C) == pytest.approx(expected, abs=0.05)
 
 
-def test_models_are_averaged(rubbing):
-    case = ramp_case()
-    draws = plain_draws(case, 400)
-    stiff = {name: 1.2 * draws[name] for name in ("K", "stiffness")}
-    one, other = written_posterior(case, draws), written_posterior(case, draws | stiff)
-    found = predict([(0.5, one), (0.5, other)], [0.4])
-    means = [predict(p, [0.4]).physics_median_N[0] for p in (one, other)]
-    assert found.physics_lo_N[0] < means[0] < found.physics_median_N[0] < means[1]
-    assert found.causes == {"none": 1.0}
-
-
 @pytest.mark.parametrize(
     "asked",
     [
@@ -204,27 +182,3 @@ def test_the_result_describes_itself():
         assert answer["columns"]["tested"] == [True, False, False, False]
         assert "<table" in found._repr_html_() and "0.6" in found.text()
         assert found.plot().get_ylabel() == "force [N]"
-
-
-@pytest.mark.thorough
-def test_a_fitted_leftover_is_in_the_bands_at_every_temperature():
-    """It is tested at one temperature away from the reference and must not tilt."""
-    deformation = np.linspace(0.02, 0.54, 60)
-    curve = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
-    force = curve + np.random.default_rng(1).normal(0.0, 0.3, 60)
-    warm = np.full(60, 60.06)
-    records = make_records(deformation, force, temperature=warm, known={"temperature"})
-    # So few draws do not always settle the length of the leftover.
-    size = SHORT | {"draws": 2 * SHORT["draws"]}
-    posterior = hdcal.calibrate(make_case(records), with_gap=True, **size)
-    at = [0.1, 0.28, 0.5]
-    found = predict(posterior, at, [60.06])
-    truth = np.interp(at, deformation, curve)
-    assert np.all((found.with_gap_lo_N < truth) & (truth < found.with_gap_hi_N))
-    other = predict(posterior, at, [20.0, 100.0])
-    for rows, change in ((slice(0, 3), 1.0), (slice(3, 6), -1.0)):
-        moved = other.straight_N[rows] - found.straight_N
-        expected = change * 40.0 * 3e-4 * 205.0 * np.array(at)
-        assert moved == pytest.approx(expected, abs=0.5)
-    # The grid of the folder keeps the tested temperature itself, not a rounded one.
-    assert default_bands(posterior).tested.any()

@@ -102,18 +102,6 @@ def test_draws_that_depend_on_each_other_have_a_larger_error():
     assert errors[2] == pytest.approx(4.0 * errors[0])
 
 
-def test_the_larger_the_capacity_the_rarer_it_is_exceeded():
-    posterior = single(size=400)
-    names = ("probability", "lo", "hi", "at_confidence")
-    risks = [
-        hdcal.margin(posterior, 0.4, limit_force=limit).worst.exceedance
-        for limit in np.arange(76.0, 86.0, 1.0)
-    ]
-    for name in names:
-        chances = [getattr(risk, name) for risk in risks if risk.resolved]
-        assert len(chances) > 5 and np.all(np.diff(chances) <= 0.0)
-
-
 def test_probabilities_of_models_are_averaged():
     gears = batch(6, 400)
     pair = [(3.0, gears), (1.0, stiffer(gears, 1.1))]

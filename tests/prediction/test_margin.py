@@ -10,17 +10,13 @@ from jsonschema import Draft202012Validator
 from posteriors import (
     batch,
     compensated,
-    plain_draws,
-    ramp_case,
-    regressed,
     single,
     spring,
     stiffer,
     with_leftover,
     written_posterior,
 )
-from rigs import make_gear
-from scipy import signal, stats
+from scipy import stats
 from test_budget import exact
 
 import hdcal
@@ -51,7 +47,7 @@ def drawn_members(posterior, at: float, count: int = 2000) -> np.ndarray:
     # Centre and bend are those of the margin, the members are not.
     size = (len(d["K"]), count)
     load = d["stiffness"] * (at - d["deformation_offset"])
-    load = load + found.common["leftover"][:, 0]
+    load = load + found.common["bend"][:, 0]
     gear = d["specimen_sd"][:, None] * rng.normal(size=size)
     zero = d["run_offset_sd"][:, None] * rng.normal(size=size)
     noise = d["sigma"][:, None] * rng.normal(size=size)
@@ -81,24 +77,6 @@ def test_a_capacity_meets_what_it_was_asked_to(gears):
     asked = hdcal.margin(gears, 0.4, required_probability=0.999).worst
     risk = hdcal.margin(gears, 0.4, limit_force=asked.capacity_N).worst.exceedance
     assert risk.at_confidence == pytest.approx(1e-3, rel=1e-2)
-
-
-def test_bounds_are_the_wider_the_wider_the_population(gears):
-    found = [
-        hdcal.margin(gears, 0.4, population=population)
-        for population in ("readings", "mountings", "specimens", None)
-    ]
-    bounds = [each.worst.upper_bound_N for each in found]
-    assert bounds[0] < bounds[1] < bounds[2] == bounds[3]
-
-
-def test_the_load_has_no_zero_and_no_noise(one):
-    found = hdcal.margin(one, 0.4, quantity="load").worst
-    draws = one.draws
-    load = draws["stiffness"] * (0.4 - draws["deformation_offset"])
-    assert found.upper_bound_N == pytest.approx(np.quantile(load, 0.95), rel=2e-3)
-    # Nothing scatters: what any share needs is what all need.
-    assert found.force_N.hi == pytest.approx(found.member_N.hi, rel=1e-3)
 
 
 def test_of_several_temperatures_the_worst_counts():
@@ -216,17 +194,6 @@ def test_a_force_that_nothing_reaches_has_no_deformation(gears):
     assert found.median_mm is found.lower_bound_mm is None and not found.tested
 
 
-def test_what_is_reached_first_is_reached():
-    """Correlated readings leave a wide bend: far out a quantile falls again."""
-    rng = np.random.default_rng(0)
-    place = np.linspace(0.01, 0.54, 60)
-    noise = signal.lfilter([0.96], [1.0, -0.8], rng.normal(size=260))[200:]
-    found = regressed(place, 150.0 * place - 1.0 + noise, rng)
-    reached = hdcal.margin(found, 0.4, given_force=60.0).reached
-    assert 0.3 < reached.lower_bound_mm < reached.median_mm < reached.upper_bound_mm
-    assert reached.upper_bound_mm < 0.5
-
-
 def test_the_first_crossing_is_interpolated():
     places = np.array([0.0, 1.0, 2.0, 3.0])
     curves = np.array(
@@ -237,18 +204,6 @@ def test_the_first_crossing_is_interpolated():
 
 
 # --- beyond the data, several models, other quantities ---
-
-
-def test_beyond_the_tested_deformation_the_bend_widens(one):
-    inside, beyond = (hdcal.margin(one, at) for at in (0.5, 0.7))
-    spans = [found.worst.force_N for found in (inside, beyond)]
-    widths = [span.hi - span.lo for span in spans]
-    assert inside.extrapolated == () and inside.beyond_tested == 0.0
-    assert beyond.extrapolated and not beyond.worst.tested
-    assert beyond.beyond_tested == pytest.approx(0.16 / 0.52)
-    # More than the line alone, which widens in proportion.
-    assert widths[1] > widths[0] * 0.7 / 0.5 + 0.5
-    assert beyond.bend_N[1] > 2.0 * inside.bend_N[1]
 
 
 def test_a_fitted_leftover_is_in_the_force():
@@ -281,39 +236,6 @@ def test_models_are_averaged_by_their_probability(gears):
     twice = hdcal.margin([(0.3, gears), (0.7, gears)], 0.4)
     assert twice.worst.upper_bound_N == pytest.approx(low, rel=2e-3)
     assert twice.causes == {"none": 1.0}
-
-
-def test_the_same_seed_gives_the_same_margin(gears):
-    first, second, third = (
-        hdcal.margin(gears, 0.6, seed=seed).to_dict() for seed in (1, 1, 2)
-    )
-    assert first == second != third
-
-
-def test_unloading_begins_at_the_top():
-    case = ramp_case(known={"unloading"}, sense=np.tile([1.0, -1.0], 15))
-    loop = {
-        "hysteresis.force": np.full(200, 4.0),
-        "hysteresis.reach": np.full(200, 0.05),
-    }
-    posterior = written_posterior(
-        case, plain_draws(case, 200) | loop, effects=["hysteresis"]
-    )
-    up, down = (
-        hdcal.margin(posterior, 0.4, direction=way, quantity="load")
-        for way in ("up", "down")
-    )
-    gap = up.worst.force_N.median - down.worst.force_N.median
-    assert gap == pytest.approx(8.0, abs=0.1) and down.turn_mm == 0.54
-
-
-def test_the_load_height_enters_a_cup():
-    cup = single(make_gear(theory="cup"), 400)
-    plain, wide = (
-        hdcal.margin(cup, 0.4, tolerances=sizes).worst.upper_bound_N
-        for sizes in ({}, {"load_height_mm": 3.0})
-    )
-    assert wide > plain + 2.0
 
 
 # --- the result ---

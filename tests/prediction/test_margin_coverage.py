@@ -10,12 +10,11 @@ from functools import cache
 import jax
 import numpy as np
 import pytest
-from posteriors import regressed, written_posterior
+from posteriors import written_posterior
 from readings import draw_reading
 from rigs import draw_truth, make_case, make_records, posterior_draws
 from scipy import stats
 
-import hdcal
 from hdcal.data.priors import effect_priors
 from hdcal.inference.problem import build_problem
 from hdcal.inference.values import member_base
@@ -129,61 +128,4 @@ def test_bounds_cover(population: str, size: int):
     assert shortfall(hits[:, PREDICTIVE, 0]) < LEVEL
 
 
-def budgets(rigs: int, seed: int) -> np.ndarray:
-    """Return whether y ± U of six readings holds the next reading, for each rig."""
-    rng, x, held = np.random.default_rng(seed), np.linspace(0.05, 0.54, 6), []
-    for _ in range(rigs):
-        true = 205.0 * x - 1.0
-        posterior = regressed(x, true + rng.normal(0.0, 0.6, 6), rng)
-        found = hdcal.margin(posterior, AT)
-        ahead = 205.0 * AT - 1.0 + rng.normal(0.0, 0.6)
-        held.append(abs(ahead - found.estimate_N) <= found.expanded_uncertainty_N)
-    return np.array(held)
-
-
-def test_the_stated_coverage_is_kept():
-    assert shortfall(budgets(60, seed=21)) > LEVEL
-
-
 WARM, ALPHA, ALPHA_SD, ZERO_SD, FRAME_SD = 80.0, 3e-4, 4e-5, 0.1, 1e-3
-
-
-def warm_rigs(count: int, seed: int) -> np.ndarray:
-    """Return which rigs, tested at 20 °C, hold the truth at 80 °C, [rig, kind].
-
-    Of the mean reading, of one more reading, and of the mean of a rig taken for still.
-    """
-    rng, x, held = np.random.default_rng(seed), np.linspace(0.02, 0.54, 30), []
-    for _ in range(count):
-        stiffness, zero = rng.uniform(150.0, 260.0), rng.normal()
-        force = stiffness * x + zero + rng.normal(0.0, 0.5, 30)
-        posterior = regressed(x, force, rng)
-        rise = WARM - 20.0
-        warm = stiffness * (1.0 - rng.normal(ALPHA, ALPHA_SD) * rise)
-        at = AT + rng.normal(0.0, FRAME_SD) * rise
-        truth = warm * at + zero + rng.normal(0.0, ZERO_SD) * rise
-        bands = hdcal.predict(posterior, [AT], [WARM])
-        new = truth + rng.normal(0.0, 0.5)
-        draws = posterior.draws
-        still = draws["stiffness"] * (1.0 - draws["alpha"] * rise) * AT
-        low, high = np.quantile(still + draws["force_offset"], [0.025, 0.975])
-        held.append(
-            [
-                bands.physics_lo_N[0] <= truth <= bands.physics_hi_N[0],
-                bands.new_measurement_lo_N[0] <= new <= bands.new_measurement_hi_N[0],
-                low <= truth <= high,
-            ]
-        )
-    return np.array(held)
-
-
-def test_a_slice_of_rigs_holds_at_another_temperature():
-    held = warm_rigs(24, seed=4)
-    assert min(map(shortfall, held[:, :2].T)) > LEVEL
-    assert shortfall(held[:, 2]) < LEVEL
-
-
-@pytest.mark.slow
-def test_rigs_hold_at_another_temperature():
-    mean, new, _ = warm_rigs(300, seed=5).mean(axis=0)
-    assert 0.92 <= mean <= 0.98 and 0.92 <= new <= 0.98, (mean, new)

@@ -5,7 +5,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from posteriors import batch, single, spring
+from posteriors import single, spring
 
 import hdcal
 from hdcal.errors import InputError, NotUsable
@@ -126,11 +126,6 @@ def test_models_have_probabilities_and_are_of_the_same_data(one):
         with pytest.raises(InputError) as refused:
             hdcal.margin(models, 0.4)
         assert fields(refused) == ["models"]
-
-
-def test_two_gears_are_a_population():
-    found = hdcal.margin(batch(2, 400), 0.4, population="specimens")
-    assert found.population == "specimens"
 
 
 def test_shares_are_limited_by_the_draws_and_by_the_model():

@@ -92,27 +92,16 @@ WARM = {"temperature": [-20.0, 20.0, 80.0]}
 ASKED = {
     "readings": (lambda: single(size=SIZE), AT | WARM | {"given_force": 80.0}),
     "rounded": (lambda: single(make_gear(resolution=0.98), SIZE), AT),
-    "load": (lambda: single(size=SIZE), AT | {"quantity": "load", "limit_force": 82.0}),
-    "beyond": (
-        lambda: single(size=SIZE),
-        AT | {"deformation": 0.7, "limit_force": 142.0},
-    ),
     "tolerances": (
         lambda: single(size=SIZE),
         AT | {"tolerances": {"wall_thickness_mm": 0.02}},
     ),
-    "mountings": (lambda: batch(6, SIZE), AT | {"population": "mountings"}),
     "specimens": (lambda: batch(6, SIZE), AT | WARM | {"given_force": 80.0}),
     "averaged": (two_models, AT | {"given_force": 80.0}),
     "leftover": (
         lambda: with_leftover(SIZE),
         AT | {"deformation": 0.58, "limit_force": 118.0},
     ),
-    "stiffening": (
-        lambda: looped(progressive_stiffening__slope=0.4),
-        AT | {"given_force": 80.0, "limit_force": 94.0},
-    ),
-    "loading": (friction, AT | {"given_force": 80.0}),
     "unloading": (friction, AT | {"direction": "down", "given_force": 80.0}),
     "drifting zero": (lambda: looped(thermal_zero_drift__slope=0.1), AT | WARM),
 }
@@ -147,23 +136,6 @@ def test_a_capacity_is_a_size_or_has_the_sign_of_the_force():
     with pytest.raises(InputError) as refused:
         hdcal.margin(pressed, 0.4, limit_force=-70.0)
     assert [finding.where for finding in refused.value.findings] == ["limit_force"]
-
-
-def test_a_force_is_reached_on_its_side_whatever_else_is_asked():
-    """Data of both directions of loading."""
-    case = ramp_case()
-    records = replace(
-        case.records,
-        deformation=np.linspace(-0.54, 0.54, 30),
-        force=205.0 * np.linspace(-0.54, 0.54, 30),
-        sense=np.tile([1.0, -1.0], 15),
-    )
-    both = written_posterior(replace(case, records=records), plain_draws(case, SIZE))
-    across = hdcal.margin(both, 0.4, given_force=-80.0).reached
-    own = hdcal.margin(both, -0.4, given_force=-80.0).reached
-    for name in ("median_mm", "lower_bound_mm", "upper_bound_mm"):
-        assert getattr(across, name) == pytest.approx(getattr(own, name), rel=1e-3)
-    assert own.tested and own.lower_bound_mm < own.median_mm < own.upper_bound_mm < -0.3
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -210,13 +182,6 @@ def test_the_bands_are_mirrored(make, way: str):
     check_mirrored(other, found)
     loaded = 1.0 if way == "up" else -1.0
     assert found.tested.any() == (loaded in known.case.records.sense)
-
-
-def test_by_default_the_gear_is_loaded():
-    known, at = friction(), np.array([0.0, 0.1, 0.4])
-    found, other = hdcal.predict(known, at), hdcal.predict(mirrored(known), -at)
-    assert {*found.direction} == {"up"} and {*other.direction} == {"down"}
-    check_mirrored(other, found)
 
 
 def test_the_grid_of_a_result_folder_is_mirrored():

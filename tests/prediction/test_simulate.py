@@ -11,20 +11,16 @@ from posteriors import (
     plain_draws,
     ramp_case,
     single,
-    stiffer,
     with_leftover,
     written_posterior,
 )
-from rigs import make_gear
 
-import hdcal
 from hdcal.data.records import Geometry
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.prediction.models import models_of
-from hdcal.prediction.simulate import simulate, simulate_all, widest
-from hdcal.prediction.sizes import size_nodes
+from hdcal.prediction.simulate import simulate
 
 AT = 0.4
 FORCE_OF = jax.jit(force_of, static_argnames="quantity")
@@ -42,7 +38,7 @@ def line(draws: dict, at: float = AT) -> np.ndarray:
 
 def straight(members, sign: float = 1.0) -> np.ndarray:
     """Return the mean of each draw without the bend."""
-    return sign * (members.centre - members.common["leftover"])[:, 0]
+    return sign * (members.centre - members.common["bend"])[:, 0]
 
 
 def test_readings_of_one_gear_are_the_line_and_its_noise():
@@ -85,11 +81,6 @@ def test_the_centre_of_a_population_is_sd_over_root_n_from_that_of_the_tested():
     assert simulate(model, at, "mountings").sd.max() == 0.0
 
 
-def test_the_widest_population_has_two_members_or_more():
-    assert widest(single(size=20).problem) == "readings"
-    assert widest(batch(2, 20).problem) == "specimens"
-
-
 @pytest.mark.parametrize("quantity", ["reading", "load", "gear"])
 def test_a_quantity_is_that_of_each_draw_by_itself(quantity: str):
     """Zero, compliance of the rig and zero of the deformation belong to the reading."""
@@ -112,18 +103,12 @@ def test_a_quantity_is_that_of_each_draw_by_itself(quantity: str):
     assert (found.sd.max() > 0.0) == (quantity == "reading")
 
 
-def test_a_stiffer_gear_is_stiffer_in_proportion():
-    found = simulated(single(size=200), quantity="gear", factor=np.array([1.5]))
-    plain = simulated(single(size=200), quantity="gear")
-    np.testing.assert_allclose(found.centre, 1.5 * plain.centre, rtol=1e-9)
-
-
 def test_nothing_grows_between_rest_and_the_tested_range_of_a_gear():
     """The free shape is known without force, on the way to the other side too."""
     for make in (single, with_leftover):
         (model,) = models_of(make(size=200))
         at = Conditions.of([-1e-6, 1e-3, 0.02, 0.3, 0.9], 20.0, quantity="gear")
-        bend = simulate(model, at).common["leftover"]
+        bend = simulate(model, at).common["bend"]
         np.testing.assert_allclose(bend[:, :2], bend[:, [2, 2]], atol=0.02)
         assert bend[:, 4].std() > 3.0 * bend[:, 3].std()
 
@@ -138,22 +123,12 @@ def test_the_rig_drifts_outside_the_tested_temperatures_by_its_priors():
     assert frame[:, 1].std() == pytest.approx(0.06, rel=0.02)
     draws = single(size=x).draws
     loss = 1.0 - 60.0 * draws["alpha"]
-    warm = found.centre[:, 1] - found.common["leftover"][:, 1]
+    warm = found.centre[:, 1] - found.common["bend"][:, 1]
     moved = draws["stiffness"] * loss * (AT + frame[:, 1] - draws["deformation_offset"])
     expected = moved + zero[:, 1] + draws["force_offset"]
     np.testing.assert_allclose(warm, expected, rtol=1e-9)
     load = simulated(single(size=200), warm=80.0, quantity="load").common
     assert not load["zero_drift"].any() and not load["frame_drift"].any()
-
-
-def test_a_drift_that_the_model_holds_is_its_own():
-    case = ramp_case(known={"temperature"})
-    slope = {"thermal_zero_drift.slope": np.full(200, 0.1)}
-    known = written_posterior(
-        case, plain_draws(case, 200) | slope, effects=["thermal_zero_drift"]
-    )
-    found = simulated(known, warm=80.0)
-    assert not found.common["zero_drift"].any() and found.common["frame_drift"].any()
 
 
 SIZES = {"wall_thickness": 0.02, "radius": 0.05}
@@ -170,22 +145,12 @@ def drawn_factors(geometry: Geometry, tolerances: dict, count: int = 200_000):
     return np.asarray(ring(replace(geometry, **moved), 1.0) / ring(geometry, 1.0))
 
 
-def test_nodes_of_the_sizes_have_the_moments_of_brute_force():
-    geometry = make_gear().geometry
-    factor, share = size_nodes(geometry, SIZES, "ring")
-    drawn = drawn_factors(geometry, SIZES)
-    assert share.sum() == pytest.approx(1.0)
-    assert share @ factor == pytest.approx(drawn.mean(), abs=5e-4)
-    sd = np.sqrt(share @ (factor - share @ factor) ** 2)
-    assert sd == pytest.approx(drawn.std(), rel=5e-3)
-
-
 def test_tolerances_widen_as_brute_force_says():
     one, rng = single(size=400), np.random.default_rng(1)
     found = simulated(one, tolerances=SIZES)
     drawn = rng.choice(drawn_factors(one.case.gear.geometry, SIZES), (400, 4000))
     noise = one.draws["sigma"][:, None] * rng.normal(size=drawn.shape)
-    zero = one.draws["force_offset"] + found.common["leftover"][:, 0]
+    zero = one.draws["force_offset"] + found.common["bend"][:, 0]
     force = line(one.draws)[:, None] * drawn + zero[:, None] + noise
     for level in (0.01, 0.5, 0.99):
         expected = np.quantile(force, level, axis=1)
@@ -247,21 +212,10 @@ def test_unloading_begins_at_the_largest_tested_deformation(name: str):
             none = np.zeros(len(along), dtype=int)
             path = grid_records(along, np.full(len(along), 20.0), sense, 0.0, none)
             expected = float(FORCE_OF(known.problem, value, path)[0][-1])
-            centre = found[back].centre - found[back].common["leftover"]
+            centre = found[back].centre - found[back].common["bend"]
             assert centre[0, row] == pytest.approx(expected, abs=1e-6), (back, place)
     gap = found[False].centre - found[True].centre
     assert np.all(gap[:, :2] > 1.0)
-
-
-def test_several_models_have_the_draws_of_each_with_its_weight():
-    gears = batch(6, 200)
-    pair = models_of([(3.0, gears), (1.0, stiffer(gears, 1.1))])
-    assert [model.probability for model in pair] == [0.75, 0.25]
-    at = Conditions.of(AT, 20.0)
-    both, each = simulate_all(pair, at), [simulate(model, at) for model in pair]
-    centres = np.concatenate([one.centre for one in each])
-    np.testing.assert_array_equal(both.centre, centres)
-    assert both.weight[:200].sum() == pytest.approx(0.75)
 
 
 def test_a_seed_decides_what_the_draws_leave_open():
@@ -272,30 +226,3 @@ def test_a_seed_decides_what_the_draws_leave_open():
     )
     np.testing.assert_array_equal(one, two)
     assert not np.array_equal(one, other)
-
-
-def test_a_fitted_leftover_belongs_to_the_reading_and_the_load():
-    gap = with_leftover(200)
-    plain = written_posterior(
-        ramp_case(),
-        {name: v for name, v in gap.draws.items() if not name.startswith("gap")},
-    )
-    place = np.array([AT])
-    left = (
-        gap.draws["gap_weights"]
-        @ np.asarray(gap.problem.discrepancy.columns(place, np.ones(1))).T
-    )
-    for quantity in ("reading", "load"):
-        one, other = (simulated(p, quantity=quantity) for p in (gap, plain))
-        np.testing.assert_allclose(
-            straight(one) - straight(other), left[:, 0], atol=1e-9
-        )
-    assert np.abs(simulated(gap).common["leftover"]).max() == 0.0
-
-
-def test_the_public_answers_use_the_simulated_forces():
-    gears = batch(6, 400)
-    members = simulated(gears, "specimens")
-    found = hdcal.margin(gears, AT).worst
-    low, high = np.quantile(members.centre, [0.025, 0.975], method="hazen")
-    assert (found.force_N.lo, found.force_N.hi) == pytest.approx((low, high))

@@ -16,7 +16,8 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import WILD
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
-from hdcal.prediction.bands.predict import Bands, default_bands
+from hdcal.prediction.bands.predict import default_bands
+from hdcal.prediction.bands.result import Bands
 from hdcal.report.chart_spec import Chart
 from hdcal.report.draws_charts import prior_chart, rank_chart
 from hdcal.report.item import Interval, Item, Words, quantity

@@ -13,7 +13,7 @@ from hdcal.prediction.bands.charts import (
     branch_marks,
     branches,
 )
-from hdcal.prediction.bands.predict import Bands
+from hdcal.prediction.bands.result import Bands
 from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.chart_spec import (
     CYCLE,

@@ -14,7 +14,6 @@ from hdcal.data.records import Records
 from hdcal.errors import Finding
 from hdcal.inference.values import Values
 from hdcal.prediction.forces import Quantity
-from hdcal.quantities import FORCE, Quantities
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -22,11 +21,9 @@ SENSE = {"up": 1.0, "down": -1.0}
 # How far beyond the data still counts as tested: thermometers are no better [K], and
 # a deformation is compared with itself as it was written [mm].
 NEAR_K, NEAR_MM = 1.0, 1e-9
-# Temperatures of one answer, at each of which every draw has a force.
-MOST_LEVELS = 1_000
-# A force this many times larger or smaller than the usual is a slip of the unit; so is
-# a deformation this many times the largest that was read.
-_OFF = 100.0
+# A deformation this many times the largest that was read is a slip of the unit; so is a
+# force this many times larger or smaller than the usual.
+OFF = 100.0
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
 
@@ -157,25 +154,6 @@ def _within(values, measured, slack: float) -> np.ndarray:
     return (values >= low - slack) & (values <= high + slack)
 
 
-def slip_findings(
-    name: str, force: float, usual: float, deformation: float, units: Quantities = FORCE
-) -> list[Finding]:
-    """Return a finding where a force can only be a slip of the unit.
-
-    Args:
-        name: of the parameter.
-        force: as given, of either sign [N].
-        usual: what the deformation takes, a size [N].
-        deformation: as given [mm].
-        units: of what was measured.
-    """
-    if not usual > 0.0 or usual / _OFF < abs(force) < usual * _OFF:
-        return []
-    unit, place = units.load_unit, f"{deformation:g} {units.displacement_unit}"
-    words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
-    return [Finding(name, words, f"Give it in {unit}")]
-
-
 def far_findings(
     deformation: float, tested: float, reach: float = math.inf, unit: str = "mm"
 ) -> list[Finding]:
@@ -187,7 +165,7 @@ def far_findings(
         reach: what no gear of this radius reaches [mm].
         unit: of all of them.
     """
-    if abs(deformation) < reach and abs(deformation) <= tested * _OFF:
+    if abs(deformation) < reach and abs(deformation) <= tested * OFF:
         return []
     words = f"{deformation:g} {unit}, where the readings reach to {tested:g} {unit}"
     return [Finding("deformation", words, f"Give it in {unit}")]
@@ -216,24 +194,6 @@ def excluded_findings(case: Case, deformation: float, sense: float) -> list[Find
     )
     remedy = "See the notes of the calibration; `range` chooses another part"
     return [Finding("deformation", words, remedy)]
-
-
-def level_findings(
-    temperature: np.ndarray, name: str, most: int = MOST_LEVELS
-) -> list[Finding]:
-    """Return what is wrong with the temperatures at all of which something holds.
-
-    Args:
-        temperature: those asked for [°C].
-        name: of the parameter.
-        most: temperatures that can be answered at once.
-    """
-    if temperature.size == 0 or not np.isfinite(temperature).all():
-        return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
-    if temperature.size > most:
-        words = f"{temperature.size} temperatures are too many"
-        return [Finding(name, words, f"Give at most {most}")]
-    return []
 
 
 def temperature_findings(

@@ -9,6 +9,8 @@ from pydantic import AliasGenerator, BaseModel, ConfigDict, Field
 from hdcal.quantities import Quantities
 
 INTERVAL = 0.95
+# Shares below the lower end, the median and the upper end of an interval.
+TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 
 Words = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=0)]

@@ -20,7 +20,7 @@ from hdcal.report.chart_spec import (
 )
 
 if TYPE_CHECKING:
-    from hdcal.prediction.bands.predict import Bands
+    from hdcal.prediction.bands.result import Bands
 
 # Kind of a band, its label and its opacity; each lies on those before it.
 _BANDS = (

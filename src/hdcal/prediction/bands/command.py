@@ -46,14 +46,14 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     """
     from hdcal.inference.model_average import load_models
     from hdcal.prediction.bands.predict import predict as bands_of
-    from hdcal.prediction.models import models_of
+    from hdcal.prediction.models import model_pairs
     from hdcal.report.saving import Target
     from hdcal.report.table_files import columns_csv
 
     file = None
     with console.wrong as wrong:
         models = wrong.attempt(load_models, run)
-        units = FORCE if models is None else models_of(models)[0].posterior.case.units
+        units = FORCE if models is None else model_pairs(models)[0][1].case.units
         if out is not None:
             beginning = ",".join(map(units.key, _COLUMNS)).encode()
             file = console.hold(partial(Target, out, force, beginning=beginning))

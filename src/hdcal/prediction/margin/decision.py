@@ -1,4 +1,4 @@
-"""Conformity whether a force keeps a limit (ISO/IEC 17025, JCGM 106:2012, ILAC-G8)."""
+"""Decision whether a force keeps a limit (ISO/IEC 17025, JCGM 106:2012, ILAC-G8)."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ Statement = Literal["conforms", "does not conform", "undecided"]
 
 
 class Conformity(Item):
-    """Conformity on one member; limit and guard band are sizes along the loading.
+    """Decision on one member; limit and guard band are sizes along the loading.
 
     Attributes:
         rule: guarded or simple.

@@ -11,9 +11,8 @@ from hdcal.prediction.margin.result import Reached
 from hdcal.prediction.members import over_draws
 from hdcal.prediction.models import Model
 from hdcal.prediction.simulate import simulate_all
-from hdcal.report.item import INTERVAL
+from hdcal.report.item import TAILS
 
-_TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 # Searched up to this multiple of the tested deformation, at so many places, in so many
 # draws; between places the force is interpolated.
 _REACH, _PLACES, _DRAWS = 2.0, 65, 1000
@@ -63,7 +62,7 @@ def deformation_reached(
         found = over_draws(ends[:, None], members.weight, shares)[:, 0]
         return [sign * float(x) if abs(x) < _NONE else None for x in found]
 
-    middle = first(members.centre, size, _TAILS)[::sign]
+    middle = first(members.centre, size, TAILS)[::sign]
     upper = members.quantile(asked.content)
     lower = members.quantile(1.0 - asked.content)
     ends = [

@@ -1,4 +1,4 @@
-"""MarginRequest of a margin, and what is wrong with one."""
+"""Request of a margin, and what is wrong with one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,11 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.conditions import (
     DIRECTIONS,
+    OFF,
     SENSE,
     Direction,
     excluded_findings,
     far_findings,
-    level_findings,
-    slip_findings,
     temperature_findings,
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
@@ -30,11 +29,13 @@ from hdcal.quantities import Quantities
 
 Rule = Literal["guarded", "simple"]
 RULES: tuple[Rule, ...] = get_args(Rule)
+# Temperatures of one answer, at each of which every draw has a force.
+_MOST_TEMPERATURES = 1_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class MarginRequest:
-    """MarginRequest of a margin; the attributes are those of `margin`.
+    """Request of a margin; the attributes are those of `margin`.
 
     Attributes:
         temperature: of the specimen [°C], (t,).
@@ -105,9 +106,7 @@ def require_answerable(
     with Findings() as wrong:
         impossible = [*_deformation(posterior, at, movement)]
         wrong += impossible
-        wrong += level_findings(asked.temperature, "temperature") or (
-            temperature_findings(gear, main.draws, asked.temperature)
-        )
+        wrong += _temperatures(main, asked.temperature)
         shares = {"content": asked.content, "confidence": asked.confidence}
         if asked.required != asked.content:
             shares["required_probability"] = asked.required
@@ -146,6 +145,16 @@ def _deformation(
         yield from excluded_findings(posterior.case, deformation, movement)
 
 
+def _temperatures(main: Model, temperature: np.ndarray) -> list[Finding]:
+    name = "temperature"
+    if temperature.size == 0 or not np.isfinite(temperature).all():
+        return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
+    if temperature.size > _MOST_TEMPERATURES:
+        words = f"{temperature.size} temperatures are too many"
+        return [Finding(name, words, f"Give at most {_MOST_TEMPERATURES}")]
+    return temperature_findings(main.posterior.case.gear, main.draws, temperature)
+
+
 def _forces(
     main: Model, asked: MarginRequest, limit_force: float | None, units: Quantities
 ) -> Iterator[Finding]:
@@ -162,8 +171,10 @@ def _forces(
         elif force == 0.0:
             words = f"{force:g} {unit} is no {units.load}"
             yield Finding(name, words, f"Give a number of {unit}")
-        elif wrong := slip_findings(name, force, usual, at, units):
-            yield from wrong
+        elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
+            place = f"{at:g} {units.displacement_unit}"
+            words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
+            yield Finding(name, words, f"Give it in {unit}")
         elif name == "limit_force" and force < 0.0 < asked.direction_of_loading:
             words = f"{force:g} {unit} is no limit of the {units.load} at "
             words += f"{at:g} {units.displacement_unit}, which is positive"

@@ -1,0 +1,101 @@
+"""Bands as a result: the table of the force with labels and units."""
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, computed_field
+
+from hdcal.prediction.bands.charts import bands_chart
+from hdcal.report.chart_spec import Chart
+from hdcal.report.item import Draws, Interval, Probability, quantity
+from hdcal.report.result import Result
+
+
+class Bands(Result):
+    """Equal-tailed bands of the force as read, with one entry per row.
+
+    Attributes:
+        deformation_mm: as read.
+        temperature_C: of the specimen.
+        direction: up or down.
+        physics_lo_N: credible band of the mean reading, without a fitted leftover.
+        with_gap_lo_N: credible band with the leftover discrepancy; NaN if not fitted.
+        new_measurement_lo_N: predictive band of one more reading, on a new run and a
+            new specimen where these were fitted, with the rounding of the rig.
+        tested: deformation, temperature and direction lie within the data.
+        usable: the calibration passed its checks.
+        straight_N: median of the model without the bend that the readings leave
+            possible.
+        interval: probability inside the bands.
+        causes: probability of each hypothesis that was averaged over.
+        weight_left_out: probability of hypotheses that were not calibrated.
+        averaging: sentences on these.
+        tested_range: deformations, temperatures and directions of the data, in words.
+    """
+
+    template = "prediction/bands/report.md.j2"
+    table = "values"
+
+    format: Literal["hdcal.prediction/1"] = "hdcal.prediction/1"
+    deformation_mm: Draws = quantity("deformation", "mm")
+    temperature_C: Draws = quantity("temperature", "°C")
+    direction: Draws = quantity("direction")
+    physics_lo_N: Draws = quantity("mean, lower end", "N")
+    physics_median_N: Draws = quantity("mean", "N")
+    physics_hi_N: Draws = quantity("mean, upper end", "N")
+    with_gap_lo_N: Draws = quantity("with the leftover, lower end", "N")
+    with_gap_median_N: Draws = quantity("with the leftover", "N")
+    with_gap_hi_N: Draws = quantity("with the leftover, upper end", "N")
+    new_measurement_lo_N: Draws = quantity("one new reading, lower end", "N")
+    new_measurement_median_N: Draws = quantity("one new reading", "N")
+    new_measurement_hi_N: Draws = quantity("one new reading, upper end", "N")
+    tested: Draws = quantity("tested")
+    usable: Draws = quantity("usable")
+    straight_N: Draws
+    interval: float = Field(gt=0.0, lt=1.0)
+    causes: dict[str, Probability]
+    weight_left_out: Probability
+    averaging: tuple[str, ...] = Field(exclude=True)
+    tested_range: str = Field(exclude=True)
+
+    @computed_field(
+        alias="columns", json_schema_extra={"additionalProperties": {"type": "array"}}
+    )
+    @property
+    def values(self) -> dict[str, tuple[Any, ...]]:
+        """Columns of the table by name; what was not fitted is null."""
+        names = {self.units.key(name): name for name in COLUMNS}
+        found = {key: getattr(self, name).tolist() for key, name in names.items()}
+        return {
+            key: tuple(None if value != value else value for value in values)
+            for key, values in found.items()
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table of bands.csv."""
+        columns = {self.units.key(name): getattr(self, name) for name in COLUMNS}
+        return pd.DataFrame(columns)
+
+    @property
+    def untested(self) -> int:
+        """Number of rows outside the data."""
+        return int(np.sum(~self.tested))
+
+    @property
+    def mean_N(self) -> Interval:
+        """Mean force at the first row."""
+        ends = (self.physics_median_N, self.physics_lo_N, self.physics_hi_N)
+        median, lo, hi = (float(end[0]) for end in ends)
+        return Interval(median=median, lo=lo, hi=hi)
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return force over deformation."""
+        return {"bands": bands_chart(self)}
+
+
+# Columns of bands.csv, in their order.
+COLUMNS = tuple(
+    name for name, field in Bands.model_fields.items() if field.exclude and field.title
+)
