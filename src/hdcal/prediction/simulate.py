@@ -239,24 +239,33 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
 def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
     """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
 
-    They act on a reading outside the tested temperatures, by their priors, unless the
-    model holds them as effects.
+    They act on a reading outside the tested temperatures.
+    """
+    warm = model.posterior.case.records.temperature
+    kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
+    if at.quantity != "reading" or not kelvins.any():
+        return dict.fromkeys(DRIFTS, np.zeros((model.size, at.size)))
+    return {
+        name: (mean + sd * score[name][:, None] * at.loading) * kelvins
+        for name, (mean, sd) in rig_drifts(model).items()
+    }
+
+
+def rig_drifts(model: Model) -> dict[str, tuple[float, float]]:
+    """Return mean and sd of the drift of the gauge's zero [N/K] and the frame [mm/K].
+
+    By the priors of their effects, and none where the model has that effect.
     """
     case = model.posterior.case
-    warm = case.records.temperature
-    kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
     # A frame expands by its own length, however short the stroke.
     stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
     priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
     priors |= case.gear.effect_priors
     held = {effect.name for effect in model.effects}
-    drifts = {}
-    for name, effect in DRIFTS.items():
-        mean, sd = moments(priors[f"{effect}.slope"])
-        acts = at.quantity == "reading" and effect not in held
-        slope = mean + sd * score[name][:, None] * at.loading
-        drifts[name] = slope * kelvins if acts else np.zeros((model.size, at.size))
-    return drifts
+    return {
+        name: (0.0, 0.0) if effect in held else moments(priors[f"{effect}.slope"])
+        for name, effect in DRIFTS.items()
+    }
 
 
 def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
