@@ -52,7 +52,7 @@ def simulate(
         seed: of the scores of what the draws leave open.
     """
     problem, draws, count = model.problem, model.draws, model.size
-    reading, score = at.quantity == "reading", _scores(model.size, seed)
+    reading, score = at.quantity == "reading", draw_scores(model.size, seed)
     gears = problem.specimens if population == "specimens" else 0
     mountings = problem.runs if population != "readings" and reading else 0
     none = np.zeros(count)
@@ -122,7 +122,7 @@ def gear_forces(
         draws: other values of the parameters, such as those of another material.
         seed: of the scores of what the draws leave open.
     """
-    bend, acting = _bend(model, at, _scores(model.size, seed))
+    bend, acting = _bend(model, at, draw_scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
     moved = np.zeros((model.size, at.size))
     return _forces(model, at, factor, moved, acting, draws)[0][:, 0] + bend
@@ -140,8 +140,10 @@ def gear_leftover(
         deformation: from the free shape, per mm as read, (row,).
         seed: of the scores of what the draws leave open.
     """
-    score, sign = _scores(model.size, seed), np.where(deformation < 0.0, -1.0, 1.0)
-    warm = model.posterior.case.gear.reference_temperature
+    score, case = draw_scores(model.size, seed), model.posterior.case
+    warm, tested = case.gear.reference_temperature, case.records.deformation
+    # One direction of loading, so that the curve has no step at the free shape.
+    sign = -1.0 if np.min(tested) + np.max(tested) < 0.0 else 1.0
     ways = [
         Conditions.of(deformation, warm, sign, unloading, quantity="gear")
         for unloading in (False, True)
@@ -204,7 +206,7 @@ def _path(at: Conditions, records: Records) -> Records:
 
 
 @cache
-def _scores(count: int, seed: int) -> dict[str, np.ndarray]:
+def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
     """Return scores of each draw by Latin hypercube sampling: evenly, in random order.
 
     Standard normal, but for `law`, which lies between 0 and 1.
