@@ -110,7 +110,7 @@ def test_options_of_other_models_are_refused(here: Hdcal, case: Path):
 
 @pytest.mark.slow
 def test_an_interruption_takes_effect_within_two_seconds(run: Path, tmp_path: Path):
-    long = ["--duration", "30", "--points", "100001", "--draws", "500"]
+    long = ["--duration", "15", "--points", "100001", "--draws", "500"]
     given = ["respond", run, "--force", "step", "--amplitude", "10", *long]
     process = subprocess.Popen(
         [*MAIN, *map(str, given)], cwd=tmp_path, stderr=subprocess.PIPE

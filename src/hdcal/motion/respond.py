@@ -228,16 +228,20 @@ def _integrate_all(
     """
     case, (kept, _) = gears.posterior.case, acting(gears.effects)
     about = case_reading(case), at, drive.force, drive.times, case.gear.reach
-    count, size = len(draws[1]), max(min(_CHUNK, _MOST_STATES // len(drive.times)), 1)
+    count, times = len(draws[1]), len(drive.times)
+    size = max(min(_CHUNK, _MOST_STATES // times), 1)
+    motion, peak = np.empty((count, times)), np.empty(count)
+    done, gone = np.empty(count, bool), np.empty(count, bool)
     # A computation of JAX does not react to an interruption: it runs in a thread.
     pool = ThreadPoolExecutor(1)
     try:
-        moved = pool.submit(
-            lambda: jax.device_get(_moved(draws, *about, kept=kept, size=size))
-        ).result()
+        for first in range(0, count, size):
+            rows = slice(first, first + size)
+            part = jax.tree.map(lambda each, rows=rows: each[rows], draws)
+            moved = pool.submit(_computed, part, *about, kept=kept).result()
+            motion[rows], peak[rows], done[rows], gone[rows] = moved
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-    motion, peak, done, gone = moved
     if gone.any():
         words = f"{np.count_nonzero(gone)} of {count} gears give way under this force"
         remedy = "ask for a smaller amplitude, or measure that far, pulled and pushed"
@@ -248,8 +252,12 @@ def _integrate_all(
     return motion, peak
 
 
-@jit(static_argnames=("kept", "size"))
-def _moved(draws, reading, at, force, times, reach, *, kept, size):
+def _computed(*given, kept):
+    return jax.device_get(_moved(*given, kept=kept))
+
+
+@jit(static_argnames=("kept",))
+def _moved(draws, reading, at, force, times, reach, *, kept):
     """Return deformation, peak and outcome of each draw."""
 
     def one(draw):
@@ -265,7 +273,7 @@ def _moved(draws, reading, at, force, times, reach, *, kept, size):
         motion = integrate(gear, force, times, reach)
         return motion.deformation, motion.largest, motion.done, motion.gone
 
-    return jax.lax.map(one, draws, batch_size=size)
+    return jax.vmap(one)(draws)
 
 
 def _estimates(gears: CalibratedGears, given, m, c, k, peak) -> Estimates:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -237,15 +238,17 @@ def integrate(
 
 def _largest(times, deformation, speed) -> Float[Array, ""]:
     """Return the largest size, by the cubic through deformations and speeds."""
-    step, share = jnp.diff(times), jnp.linspace(0.0, 1.0, _BETWEEN + 1)[:, None]
-    (y, end), slope, slope_end = (
-        (deformation[:-1], deformation[1:]),
-        step * speed[:-1],
-        step * speed[1:],
-    )
-    left = (1.0 - share) ** 2 * (y * (1.0 + 2.0 * share) + slope * share)
-    right = share**2 * (end * (3.0 - 2.0 * share) - slope_end * (1.0 - share))
-    return jnp.max(jnp.abs(left + right))
+    step = jnp.diff(times)
+    y, end = deformation[:-1], deformation[1:]
+    slope, slope_end = step * speed[:-1], step * speed[1:]
+
+    def at(share):
+        left = (1.0 - share) ** 2 * (y * (1.0 + 2.0 * share) + slope * share)
+        right = share**2 * (end * (3.0 - 2.0 * share) - slope_end * (1.0 - share))
+        return jnp.max(jnp.abs(left + right))
+
+    # One share after the other: all at once fill the memory.
+    return jnp.max(jax.lax.map(at, jnp.linspace(0.0, 1.0, _BETWEEN + 1)))
 
 
 def _slip(oscillator: Oscillator, size: Scalar) -> Float[Array, ""]:
