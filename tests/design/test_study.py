@@ -6,7 +6,7 @@ from inspect import signature
 import numpy as np
 import pytest
 from designs import bent, known
-from posteriors import with_leftover
+from posteriors import single, with_leftover
 from rigs import make_gear
 from scipy.stats import lognorm
 
@@ -116,3 +116,11 @@ def test_bad_input_is_refused(vary, changed, words):
     assert words in str(refused.value)
     names = {finding.file for finding in refused.value.findings}
     assert names <= {*signature(study).parameters, "40CrNiMo.toml"}
+
+
+def test_only_deformations_beyond_the_readings_may_bend():
+    gears = draw_gears(single(size=100))
+    for at, words in ((0.01, "free shape"), (0.8, "a bend"), (-0.3, "a bend")):
+        (warning,) = study(gears, {"deformation_mm": [0.3, at]}).warnings[:1]
+        assert warning.startswith("Extrapolated: deformation") and words in warning
+    assert not study(gears, {"deformation_mm": [0.3]}).untested
