@@ -6,7 +6,7 @@ from inspect import signature
 import numpy as np
 import pytest
 from designs import bent, known
-from posteriors import with_leftover
+from posteriors import single, with_leftover
 from rigs import make_gear
 from scipy.stats import lognorm
 
@@ -104,7 +104,8 @@ def test_the_chart_has_a_curve_for_each_combination():
         ({"wall_thickness_mm": [50.0]}, {}, "not thinner than the radius"),
         ({"radius_mm": [30.0]}, {"deformation": -31.0}, "reaches the radius of 30"),
         ({"load_height_mm": [50.0]}, {}, "changes nothing under the theory 'ring'"),
-        ({"radius_mm": np.linspace(30, 40, 10**6)}, {}, "more than 100000"),
+        ({"radius_mm": np.linspace(30, 40, 10**6)}, {}, "not between 1 and 100000"),
+        ({"radius_mm": []}, {}, "0 designs"),
         ({}, {"materials": ["40CrNiMo"]}, "Did you mean '40CrNiMoA'"),
         ({}, {"temperature": -300.0}, "absolute zero"),
         ({}, {"interval": 1.0}, "does not lie between 0 and 1"),
@@ -116,3 +117,11 @@ def test_bad_input_is_refused(vary, changed, words):
     assert words in str(refused.value)
     names = {finding.file for finding in refused.value.findings}
     assert names <= {*signature(study).parameters, "40CrNiMo.toml"}
+
+
+def test_only_deformations_beyond_the_readings_may_bend():
+    gears = draw_gears(single(size=100))
+    for at, words in ((0.01, "free shape"), (0.8, "a bend"), (-0.3, "a bend")):
+        (warning,) = study(gears, {"deformation_mm": [0.3, at]}).warnings[:1]
+        assert warning.startswith("Extrapolated: deformation") and words in warning
+    assert not study(gears, {"deformation_mm": [0.3]}).untested

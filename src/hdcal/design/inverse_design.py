@@ -257,7 +257,9 @@ def inverse_design(
 def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
     best = min(found, key=lambda one: abs(one.force_kept_N))
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
-    words = f"nothing keeps {asked.limit_force_N:g} N: the best ({at or best.material}) "
+    words = (
+        f"nothing keeps {asked.limit_force_N:g} N: the best ({at or best.material}) "
+    )
     words += f"gives {best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
     remedy = "Widen the bounds, free another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

@@ -116,8 +116,8 @@ def study(
     axes = {name: np.ravel(axes[name]).tolist() for name in (*vary, *axes)}
     listed = list(dict.fromkeys(materials)) or [gears.material]
     count = len(listed) * prod(map(len, axes.values()))
-    if count > MOST_DESIGNS:
-        words = f"{count} designs are more than {MOST_DESIGNS}"
+    if not 1 <= count <= MOST_DESIGNS:
+        words = f"{count} designs are not between 1 and {MOST_DESIGNS}"
         raise InputError([Finding("vary", words, "Vary less, or in fewer steps")])
     with Findings() as wrong:
         made = [wrong.attempt(gears.of_material, name, seed) for name in listed]
