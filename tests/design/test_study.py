@@ -15,7 +15,7 @@ from hdcal.design import study as module
 from hdcal.design.gears import draw_gears
 from hdcal.design.study import force_quantiles, study
 from hdcal.errors import InputError
-from hdcal.physics.theory import cup, ring
+from hdcal.physics.theory import ring
 from hdcal.report.chart_spec import Line
 
 GEAR = make_gear(
@@ -74,21 +74,6 @@ def test_the_forces_of_a_gear_that_is_pulled_are_negative():
     ends = other.to_frame()[["force_lo_N", "force_hi_N"]].to_numpy()
     np.testing.assert_allclose(ends, expected, rtol=1e-9)
     assert np.all(other.designs["stress_MPa"] > 0.0)
-
-
-def test_the_cup_depends_on_height_and_poissons_ratio():
-    gear = replace(GEAR, theory="cup", K_theory="cup")
-    heights = [50.0, 62.0, 70.0]
-    force = study(gear, {"load_height_mm": heights}).designs["force_median_N"]
-    stiffness = [
-        float(cup(replace(GEAR.geometry, load_height=h), 207e3)) for h in heights
-    ]
-    np.testing.assert_allclose(force / force[0], np.array(stiffness) / stiffness[0])
-    other = study(gear, {}, materials=["40CrNiMoA", "PEEK"])
-    ratio = np.divide(*other.designs["force_median_N"])
-    sizes = replace(GEAR.geometry, poisson=0.39)
-    stiff = float(cup(GEAR.geometry, 207e3)) / float(cup(sizes, 3.8e3))
-    assert ratio == pytest.approx(stiff, rel=0.02)
 
 
 def test_far_sizes_have_a_warning():

@@ -79,16 +79,6 @@ def test_the_probability_is_that_of_normal_gears(rate):
         assert spring.probability == 1.0
 
 
-@pytest.mark.parametrize("draws", [4000, 40])
-def test_choosing_on_the_same_draws_has_little_bias_if_they_are_many(draws):
-    gears, gaps = norm(200.0, 10.0), []
-    for seed in range(40):
-        spring = judge(100.0, straight(gears.rvs(draws, random_state=seed)))
-        most, least = (100.0 * (spring.interference_mm / end - 1.0) for end in WINDOW)
-        gaps.append(spring.probability - (gears.cdf(most) - gears.cdf(least)))
-    assert (np.mean(gaps) < np.sqrt(0.8 * 0.2 / 4000)) == (draws == 4000)
-
-
 def test_the_softest_spring_that_meets_the_requirement():
     found = wave_generator(known(), WINDOW, temperatures=[-20.0, 80.0])
     assert found.asked.temperature_C == (-20.0, 20.0, 80.0)
@@ -132,7 +122,8 @@ def test_a_generator_that_pulls_is_the_mirror_of_one_that_presses():
         assert two.probability == pytest.approx(one.probability, rel=1e-9)
     for one, two in zip(found.at_temperature, other.at_temperature, strict=True):
         assert two.at_lo.lo == pytest.approx(-one.at_hi.hi, rel=1e-9)
-        assert two.zero_backlash == one.zero_backlash != one.no_jam
+        assert (two.zero_backlash, two.no_jam) == (one.zero_backlash, one.no_jam)
+    assert any(one.zero_backlash != one.no_jam for one in found.at_temperature)
     assert other.stress.stress_MPa.lo == pytest.approx(found.stress.stress_MPa.lo)
     for sense, result in ((1, found), (-1, other)):
         balance, choice = result.charts()["design"].panels

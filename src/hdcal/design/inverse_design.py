@@ -51,7 +51,9 @@ class LimitAsked(request.Asked):
     @field_validator("limit_force_N")
     @classmethod
     def _check_limit(cls, limit: float, info: ValidationInfo) -> float:
-        gears, at = request.gears_of(info), info.data.get("deformation_mm", 0.0)
+        gears, at = request.gears_of(info), info.data.get("deformation_mm")
+        if at is None:
+            return limit
         usual = abs(np.median(gears.forces([at], [gears.gear.reference_temperature])))
         if limit < 0.0 < at or not usual / _OFF <= abs(limit) <= usual * _OFF:
             words = f"{limit:g} N is no limit where {at:g} mm takes about {usual:.3g} N"
@@ -255,8 +257,7 @@ def inverse_design(
 def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
     best = min(found, key=lambda one: abs(one.force_kept_N))
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
-    words = f"nothing keeps {asked.limit_force_N:g} N with probability "
-    words += f"{asked.probability:g}: the best ({at or best.material}) gives "
-    words += f"{best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
+    words = f"nothing keeps {asked.limit_force_N:g} N: the best ({at or best.material}) "
+    words += f"gives {best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
     remedy = "Widen the bounds, free another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

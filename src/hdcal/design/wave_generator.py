@@ -148,7 +148,7 @@ def wave_generator(
     rates = rates or _usual_rates(gap, middle, float(gears.gear.geometry.radius))
     springs, chosen = judge_all(rates, gap, asked.probability)
     if chosen is None:
-        raise InputError([_unmet(springs, asked)])
+        raise InputError([_unmet(springs, asked.probability)])
 
     def mirrored(one: Spring) -> Spring:
         place = {"interference_mm": asked.sense * one.interference_mm}
@@ -195,11 +195,10 @@ def _require_growing(forces: np.ndarray) -> None:
         raise InputError([Finding("window", words, remedy)])
 
 
-def _unmet(springs: Sequence[Spring], asked: WindowAsked) -> Finding:
-    (low, high), best = asked.window_mm, max(springs, key=lambda one: one.probability)
-    ends = " and ".join(f"{springs[end].rate_N_per_mm:.4g}" for end in (0, -1))
-    words = f"no spring rate between {ends} N/mm meets {low:g} … {high:g} mm with "
-    words += f"probability {asked.probability:g}: the best is {best.rate_N_per_mm:.4g} "
-    words += f"N/mm with {best.probability:.4g}"
+def _unmet(springs: Sequence[Spring], required: float) -> Finding:
+    best, (soft, *_, stiff) = max(springs, key=lambda one: one.probability), springs
+    words = f"no spring rate between {soft.rate_N_per_mm:.4g} and "
+    words += f"{stiff.rate_N_per_mm:.4g} N/mm keeps it with probability {required:g}: "
+    words += f"the best is {best.rate_N_per_mm:.4g} N/mm with {best.probability:.4g}"
     remedy = "Widen the window, narrow the temperatures or build the set point closer"
     return Finding("window", words, remedy)

@@ -191,9 +191,10 @@ def left_out_of(models: Models) -> float:
 
 def averaging_words(models: Models) -> list[str]:
     """Return sentences on the hypotheses of an average and on those left out."""
-    found, words = probabilities(models_of(models, allow_failed=True)), []
+    found, words = models_of(models, allow_failed=True), []
     if len(found) > 1:
-        listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in found.items())
+        each = probabilities(found).items()
+        listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in each)
         words.append(f"This averages over the causes that are left: {listed}.")
     missing: LeftOut | None = getattr(models, "left_out", None)
     if missing is not None and missing.probability > _ROUNDING:

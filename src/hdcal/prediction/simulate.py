@@ -52,7 +52,7 @@ def simulate(
         seed: of the scores of what the draws leave open.
     """
     problem, draws, count = model.problem, model.draws, model.size
-    reading, score = at.quantity == "reading", _scores(model.size, seed)
+    reading, score = at.quantity == "reading", draw_scores(model.size, seed)
     gears = problem.specimens if population == "specimens" else 0
     mountings = problem.runs if population != "readings" and reading else 0
     none = np.zeros(count)
@@ -122,7 +122,7 @@ def gear_forces(
         draws: other values of the parameters, such as those of another material.
         seed: of the scores of what the draws leave open.
     """
-    bend, acting = _bend(model, at, _scores(model.size, seed))
+    bend, acting = _bend(model, at, draw_scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
     moved = np.zeros((model.size, at.size))
     return _forces(model, at, factor, moved, acting, draws)[0][:, 0] + bend
@@ -140,8 +140,10 @@ def gear_leftover(
         deformation: from the free shape, per mm as read, (row,).
         seed: of the scores of what the draws leave open.
     """
-    score, sign = _scores(model.size, seed), np.where(deformation < 0.0, -1.0, 1.0)
-    warm = model.posterior.case.gear.reference_temperature
+    score, case = draw_scores(model.size, seed), model.posterior.case
+    warm, tested = case.gear.reference_temperature, case.records.deformation
+    # One direction of loading, so that the curve has no step at the free shape.
+    sign = -1.0 if np.min(tested) + np.max(tested) < 0.0 else 1.0
     ways = [
         Conditions.of(deformation, warm, sign, unloading, quantity="gear")
         for unloading in (False, True)
@@ -204,7 +206,7 @@ def _path(at: Conditions, records: Records) -> Records:
 
 
 @lru_cache(maxsize=8)
-def _scores(count: int, seed: int) -> dict[str, np.ndarray]:
+def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
     """Return scores of each draw by Latin hypercube sampling: evenly, in random order.
 
     Standard normal, but for `law`, which lies between 0 and 1.
@@ -239,24 +241,33 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
 def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
     """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
 
-    They act on a reading outside the tested temperatures, by their priors, unless the
-    model holds them as effects.
+    They act on a reading outside the tested temperatures.
+    """
+    warm = model.posterior.case.records.temperature
+    kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
+    if at.quantity != "reading" or not kelvins.any():
+        return dict.fromkeys(DRIFTS, np.zeros((model.size, at.size)))
+    return {
+        name: (mean + sd * score[name][:, None] * at.loading) * kelvins
+        for name, (mean, sd) in rig_drifts(model).items()
+    }
+
+
+def rig_drifts(model: Model) -> dict[str, tuple[float, float]]:
+    """Return mean and sd of the drift of the gauge's zero [N/K] and the frame [mm/K].
+
+    By the priors of their effects, and none where the model has that effect.
     """
     case = model.posterior.case
-    warm = case.records.temperature
-    kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
     # A frame expands by its own length, however short the stroke.
     stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
     priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
     priors |= case.gear.effect_priors
     held = {effect.name for effect in model.effects}
-    drifts = {}
-    for name, effect in DRIFTS.items():
-        mean, sd = moments(priors[f"{effect}.slope"])
-        acts = at.quantity == "reading" and effect not in held
-        slope = mean + sd * score[name][:, None] * at.loading
-        drifts[name] = slope * kelvins if acts else np.zeros((model.size, at.size))
-    return drifts
+    return {
+        name: (0.0, 0.0) if effect in held else moments(priors[f"{effect}.slope"])
+        for name, effect in DRIFTS.items()
+    }
 
 
 def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
