@@ -6,7 +6,7 @@ responses and tracking.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtri
@@ -205,7 +205,7 @@ def _path(at: Conditions, records: Records) -> Records:
     )
 
 
-@cache
+@lru_cache(maxsize=8)
 def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
     """Return scores of each draw by Latin hypercube sampling: evenly, in random order.
 
