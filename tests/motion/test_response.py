@@ -152,12 +152,13 @@ def test_a_gear_in_tension_moves_as_the_mirror_image():
         ("deformation_lo_mm", "deformation_hi_mm"),
         ("deformation_median_mm", "deformation_median_mm"),
     ):
-        np.testing.assert_allclose(pulled[one], -pressed[other], rtol=1e-9, atol=1e-12)
+        # With friction the integration allows an error of 1e-6 per step.
+        np.testing.assert_allclose(pulled[one], -pressed[other], rtol=2e-5, atol=1e-8)
     assert np.array_equal(pressed.tested, pulled.tested) and pressed.tested[0]
     for name, one in answers[0].estimates:
         other = getattr(answers[1].estimates, name)
         assert other.driven_by == one.driven_by
-        assert other.median == pytest.approx(one.median, rel=1e-9)
+        assert other.median == pytest.approx(one.median, rel=2e-5)
 
 
 @pytest.mark.parametrize(
