@@ -18,9 +18,8 @@ from hdcal.data.gear_file.certificates import GAINS
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import gear_forces
-from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.population_force import population_force
-from hdcal.tracking.stream_prior import prior_from_posterior
+from hdcal.tracking import draw_forces
 
 AT, SIZE = 0.4, 2000
 COARSE = "expanded_percent = 10.0"
@@ -120,8 +119,10 @@ def test_bands_are_of_readings():
 
 
 def test_a_stream_of_readings_begins_as_the_rig_reads():
-    plain, stated = map(prior_from_posterior, map(pool, pair()))
-    np.testing.assert_allclose(stated.coefficients(), plain.coefficients(), rtol=1e-9)
+    plain, stated = (draw_forces.draws_of(each, 0)[0] for each in pair())
+    np.testing.assert_allclose(stated.stiffness, plain.stiffness, rtol=1e-9)
+    where = np.array([0.1, AT]), np.full(2, 20.0)
+    np.testing.assert_allclose(stated.at(*where).mean, plain.at(*where).mean, rtol=1e-9)
 
 
 def test_the_derivative_of_a_load_goes_through_the_gauges():
