@@ -119,7 +119,7 @@ def test_bands_are_of_readings():
 
 
 def test_a_stream_of_readings_begins_as_the_rig_reads():
-    plain, stated = (draw_forces.draws_of(each, 0)[0] for each in pair())
+    plain, stated = (draw_forces.draws_of(each)[0] for each in pair())
     np.testing.assert_allclose(stated.stiffness, plain.stiffness, rtol=1e-9)
     where = np.array([0.1, AT]), np.full(2, 20.0)
     np.testing.assert_allclose(stated.at(*where).mean, plain.at(*where).mean, rtol=1e-9)

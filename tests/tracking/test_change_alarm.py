@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from hdcal.tracking.change_alarm import (
     ALLOWANCE,
@@ -21,23 +20,6 @@ from hdcal.tracking.change_alarm import (
 def test_run_lengths_are_the_published_ones(h, shift, rows):
     above, below = run_length(h, shift), run_length(h, -shift)
     assert 1.0 / (1.0 / above + 1.0 / below) == pytest.approx(rows, rel=5e-3)
-
-
-def chain(h: float, states: int) -> float:
-    """Brook and Evans' Markov chain, the slow twin."""
-    width = 2.0 * h / (2.0 * states - 1.0)
-    at = np.arange(states) * width
-    ends = at[None, :] + ALLOWANCE - at[:, None]
-    table = norm.cdf(ends + width / 2.0) - norm.cdf(ends - width / 2.0)
-    table[:, 0] = norm.cdf(ends[:, 0] + width / 2.0)
-    return np.linalg.solve(np.eye(states) - table, np.ones(states))[0]
-
-
-@pytest.mark.parametrize("h", [3.0, 8.05])
-def test_the_integral_equation_is_the_limit_of_the_markov_chain(h):
-    # The chain's error falls with the square of its step.
-    coarse, fine = chain(h, 150), chain(h, 300)
-    assert run_length(h) == pytest.approx(fine + (fine - coarse) / 3.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("rows", [10.0, 1e4, 1e9])

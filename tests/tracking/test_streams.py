@@ -38,7 +38,7 @@ def streams(
 
     Errors at untested conditions and of the leftover are from the model itself.
     """
-    every, start = draws_of(posterior, 0)[0], Tracker(posterior, alarm_rows=100.0)
+    every, start = draws_of(posterior)[0], Tracker(posterior, alarm_rows=100.0)
     start = start if known is None else with_correlation(start, known)
     for seed in range(count):
         rng = np.random.default_rng(seed)
@@ -114,7 +114,7 @@ def test_intervals_and_the_rate_of_alarms_hold(kind):
 
 def test_they_hold_at_untested_temperatures_and_in_long_streams():
     check(streams(single(), 30, 400, warm=60.0), 400)
-    check(streams(with_newtons(), 20, 3000, OFF_THE_MIDDLE), 3000)
+    check(streams(with_newtons(), 16, 2000, OFF_THE_MIDDLE), 2000)
 
 
 def calibrated_noise(rho: float):
@@ -125,8 +125,8 @@ def calibrated_noise(rho: float):
 
 @pytest.mark.parametrize(("rho", "calibrated"), [(0.6, 0.6), (0.6, 0.4), (0.3, 0.0)])
 def test_the_rate_holds_with_correlated_readings(rho, calibrated):
-    found = list(streams(calibrated_noise(calibrated), 12, 2000, rho=rho))
-    check(found, 2000)
+    found = list(streams(calibrated_noise(calibrated), 10, 1500, rho=rho))
+    check(found, 1500)
     last = [stream.answers[-1]["correlation"] for _, stream in found]
     assert np.mean(last) == pytest.approx(rho, abs=0.08)
 
@@ -203,7 +203,7 @@ def coarse(noise: float, count: int, rows: int):
     draws = plain_draws(case) | {"sigma": sigma}
     posterior = written_posterior(case, draws)
     at, start = np.resize(np.linspace(0.05, 0.5, 5), rows), Tracker(posterior)
-    every, found = draws_of(posterior, 0)[0], []
+    every, found = draws_of(posterior)[0], []
     for seed in range(count):
         rng = np.random.default_rng(500 + seed)
         one = every.take(rng.integers(2000, size=1))
@@ -223,18 +223,6 @@ def test_intervals_hold_where_every_force_is_read_many_times(monkeypatch):
     # Readings that count as new each time are flagged.
     monkeypatch.setattr("hdcal.tracking.first_bank.CELLS", 0)
     assert coarse(0.05, 12, 300)[1] < 0.7
-
-
-def test_a_bend_beyond_the_tested_range_is_not_learned_as_stiffness():
-    at = np.linspace(0.6, 1.0, 40)
-    force = 205.0 * at * (1.0 + 0.3 * (at - 0.54)) + np.random.default_rng(2).normal(
-        0, 0.5, 40
-    )
-    found = follow(Tracker(single()), at, force)
-    assert not any(answer["tested"] for answer in found.answers)
-    assert found.answers[-1]["stiffness_N_per_mm"]["mean"] == pytest.approx(
-        205.0, abs=6.0
-    )
 
 
 def test_an_effect_is_followed_and_few_draws_get_no_interval():

@@ -16,10 +16,10 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax import Array
 from jax.scipy.special import logsumexp, ndtr, ndtri
 from jaxtyping import Float, Int
 
-from hdcal.data.records import Array
 from hdcal.tracking.change_alarm import step_sums
 from hdcal.tracking.draw_forces import RowForces
 
@@ -51,13 +51,11 @@ class Bank(eqx.Module):
         log_weight: of each draw.
         columns, reading: of the row before, less what is fixed in each draw.
         products: sums of products of neighbouring residuals and of squares.
-        sums: of the change alarm, above and below.
+        sums, threshold: of the change alarm, above and below.
         counts, epoch: readings in each cell of the force; when counts start again.
-        stiffness: as read, of each draw [N/mm].
-        variance: of a reading without load, before the first row [N²].
+        stiffness, variance: as read [N/mm]; of a reading without load at first [N²].
         step: of the force as read [N], 0 = not rounded.
         remounting: variance of the zero from one mounting to the next [N²].
-        threshold: of the change alarm [-].
         reopen: share by which the stiffness may have moved at an alarm [-].
     """
 
@@ -117,10 +115,9 @@ def follow_rows(bank: Bank, rows: dict[str, Any], count: int):
 
     Args:
         bank: before the rows.
-        rows: each part with the rows as its first axis: the `force` as read [N], the
-            `forces` that the draws expect; whether a row `follows` the one before, so
-            that their noise may be correlated, and is `remounted`; the `cell` of its
-            force, for counts of rounded readings.
+        rows: the `force` as read [N], the `forces` that the draws expect; whether a row
+            `follows` the one before, so that their noise may be correlated, and is
+            `remounted`; the `cell` of its force. Each has the rows as its first axis.
         count: of the rows; others are padding.
 
     Returns:

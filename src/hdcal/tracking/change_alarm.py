@@ -13,7 +13,6 @@ from scipy.special import ndtr
 # Half the shift, in noise sds, that the sums are quickest to find.
 ALLOWANCE = 0.5
 _NODES = 96
-_MOST_THRESHOLD = 60.0
 
 
 def run_length(threshold: float, shift: float = 0.0) -> float:
@@ -46,8 +45,7 @@ def threshold_for(rows: float) -> float:
     def excess(h: float) -> float:
         return np.log(run_length(h)) - np.log(2.0 * rows)
 
-    ends = (0.01, _MOST_THRESHOLD)
-    return float(scipy.optimize.root_scalar(excess, bracket=ends).root)
+    return float(scipy.optimize.root_scalar(excess, bracket=(0.01, 60.0)).root)
 
 
 def step_sums(sums, innovation, threshold):

@@ -15,7 +15,8 @@ from jaxtyping import Float
 from hdcal.data.case import Case
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
-from hdcal.inference.distributions import sample_prior
+from hdcal.inference.discrepancy import Discrepancy
+from hdcal.inference.distributions import moments
 from hdcal.inference.gauges import as_read
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
@@ -31,6 +32,8 @@ from hdcal.prediction.engine.untested import Untested
 _LEAST_FOLLOWED = 0.5
 # Parts of a leftover discrepancy below this share of the noise are left out.
 _SMALL = 0.03
+# Site of the sd of the zero from one mounting to the next [N].
+MOUNTING = "run_offset_sd"
 
 
 class RowForces(NamedTuple):
@@ -59,20 +62,20 @@ class Draws:
     Attributes:
         case: that was calibrated.
         problem: structure of the model with all effects.
-        values: parameters by site, [draw, …]; of a leftover discrepancy the mean.
+        untested: what is unknown beyond the tested conditions.
         model: number of the model of each draw, shape (draw,).
+        values: parameters by site, [draw, …]; of a leftover discrepancy the mean.
         scores: coefficients of the leftover discrepancy, of unit variance, (draw, c).
         parts: weights that belong to each of these, shape (weight, c).
-        untested: what is unknown beyond the tested conditions.
     """
 
     case: Case
     problem: Problem
-    values: Values
+    untested: Untested
     model: np.ndarray
+    values: Values
     scores: np.ndarray
     parts: np.ndarray
-    untested: Untested
 
     @property
     def stiffness(self) -> np.ndarray:
@@ -86,77 +89,65 @@ class Draws:
         rounding = float(self.problem.step) ** 2 / 12.0
         return self.values["sigma"] ** 2 + rounding
 
-    def take(self, chosen: np.ndarray) -> "Draws":
+    def take(self, rows: np.ndarray) -> "Draws":
         """Return some of the draws."""
-        values = {name: column[chosen] for name, column in self.values.items()}
-        scores, model = self.scores[chosen], self.model[chosen]
+        values = {name: column[rows] for name, column in self.values.items()}
+        scores, model = self.scores[rows], self.model[rows]
         return replace(self, values=values, scores=scores, model=model)
 
     def at(self, deformation, temperature) -> RowForces:
-        """Return the readings that the draws expect.
-
-        Args:
-            deformation: as read, shape (n,) [mm].
-            temperature: of the specimen, shape (n,) [°C].
-        """
+        """Return the readings expected at deformations [mm] and temperatures [°C]."""
         rows = np.stack([deformation, temperature])
         return _forces(self.problem, self.values, self.parts, self.untested, rows)
 
 
-def draws_of(models: Models, seed: int) -> tuple[Draws, list[str]]:
+def draws_of(models: Models) -> tuple[Draws, list[str]]:
     """Return draws of the models that a stream can follow, and notes on all models.
-
-    Args:
-        models: a calibration, or several with probabilities.
-        seed: of what is drawn from priors.
 
     Raises:
         NotUsable: a calibration failed its checks.
         InputError: most of the probability lies on models that cannot be followed.
     """
-    followed, reasons, causes = [], {}, causes_of(models)
+    causes, hidden = causes_of(models), {}
     for cause in causes:
         for effect in cause.posterior.effects:
             if effect.mixture or effect.needs - {"temperature"}:
-                lacks = ", ".join(sorted(effect.needs)) or "outliers to be known"
-                words = f"its effect '{effect.name}' needs {lacks}"
-                reasons[cause.name] = f"{words}, which a stream of readings lacks"
-        if cause.name not in reasons:
-            followed.append(cause)
+                hidden[cause.name] = f"a stream does not show its '{effect.name}'"
+    followed = [cause for cause in causes if cause.name not in hidden]
     if sum(cause.probability for cause in followed) < _LEAST_FOLLOWED:
         remedy = "Calibrate without it, or diagnose blocks of rows"
-        raise InputError(Finding("known", why, remedy) for why in reasons.values())
+        raise InputError(Finding("known", why, remedy) for why in hidden.values())
     notes = averaging_words(causes)
-    notes += [f"Model '{name}' is left out: {why}." for name, why in reasons.items()]
+    notes += [f"Model '{name}' is left out: {why}." for name, why in hidden.items()]
     if left := misfits(likeliest(followed).posterior):
         notes += [*left, "This may cause alarms without a change."]
     pooled = pool_causes(followed)
     values, untested = gear_values(pooled)
-    case, site, rng = pooled.case, "run_offset_sd", np.random.default_rng(seed)
-    mounting = {site: sample_prior(pooled.priors[site], site, rng, len(pooled.index))}
-    mean, *leftover = _leftover(pooled.problem, values, case)
-    values = mounting | values | mean
+    case, model, size = pooled.case, pooled.index, len(pooled.index)
+    mounting = np.full(size, np.hypot(*moments(pooled.priors[MOUNTING], MOUNTING)))
     # The error that a file states for its rows is noise of the stream.
     stated = np.mean(np.asarray(case.records.force_sd) ** 2)
-    values["sigma"] = np.sqrt(values["sigma"] ** 2 + stated)
-    parts = case, pooled.problem, values, pooled.index, *leftover, untested
-    return Draws(*parts), notes
+    sigma = np.sqrt(values["sigma"] ** 2 + stated)
+    values = {MOUNTING: mounting, **values, "sigma": sigma}
+    scores, parts = np.empty((size, 0)), np.empty((0, 0))
+    if pooled.problem.discrepancy is not None:
+        mean, scores, parts = _leftover(pooled.problem.discrepancy, values, case)
+        values |= {"gap_weights": mean}
+    return Draws(case, pooled.problem, untested, model, values, scores, parts), notes
 
 
-def _leftover(problem: Problem, values: Values, case: Case):
+def _leftover(discrepancy: Discrepancy, values: Values, case: Case):
     """Return mean weights of the leftover discrepancy, its scores and their parts."""
-    weights, discrepancy = values.get("gap_weights"), problem.discrepancy
-    if weights is None or discrepancy is None:
-        return {}, np.empty((len(values["K"]), 0)), np.empty((0, 0))
+    weights = values["gap_weights"]
     fitted = np.any(weights != 0.0, axis=1)
     mean = fitted[:, None] * weights[fitted].mean(axis=0)
     left, size, axes = np.linalg.svd(weights - mean, full_matrices=False)
     root = np.sqrt(np.count_nonzero(fitted))
-    scores, parts = left * root, axes.T * (size / root)
     at = np.asarray(case.records.deformation)
+    parts = axes.T * (size / root)
     columns = np.asarray(discrepancy.columns(at, np.ones_like(at))) @ parts
     kept = np.abs(columns).max(axis=0) > _SMALL * np.median(values["sigma"])
-    return {"gap_weights": mean}, scores[:, kept], parts[:, kept]
+    return mean, left[:, kept] * root, parts[:, kept]
 
 
 @jax.jit

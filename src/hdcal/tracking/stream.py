@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from typing import BinaryIO, TextIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 from pydantic import ConfigDict, ValidationError
@@ -26,20 +26,17 @@ _REQUIRED, _OTHERS = ("deformation", "force"), ("temperature", "run")
 def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
     """Answer every line that is not blank, as soon as it is there.
 
-    Args:
-        tracker: of the readings.
-        source: JSON objects, or a header row and lines of CSV.
-        sink: takes a line of JSON for each.
+    The source holds JSON objects, or a header row and lines of CSV.
 
     Returns:
         Number of lines that were no reading.
     """
-    bad, read = 0, None
+    bad, of_json, of_table, first = 0, json_reader(tracker.units), None, True
     for lines in _blocks(source):
-        if lines and read is None:
-            read = csv_reader(lines[0], tracker.units)
-            lines = lines[1:] if read else lines
-            read = read or json_reader(tracker.units)
+        if first and lines:
+            of_table, first = csv_reader(lines[0], tracker.units), False
+            lines = lines[1:] if of_table else lines
+        read = of_table or of_json
         answers = tracker.follow([_attempt(read, line) for line in lines])
         bad += sum(answer["status"] != "ok" for answer in answers)
         sink.writelines(_ENCODER.encode(answer) + "\n" for answer in answers)
@@ -49,8 +46,9 @@ def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
 
 def _blocks(source: BinaryIO) -> Iterator[list[bytes]]:
     """Yield the lines that have come so far, without the blank ones."""
+    buffered: Any = source
     rest = b""
-    while chunk := source.read1(_LONGEST):
+    while chunk := buffered.read1(_LONGEST):
         *lines, rest = (rest + chunk).split(b"\n")
         rest = rest[: _LONGEST + 1]
         yield [line for line in lines if line.strip()]
@@ -84,13 +82,8 @@ def json_reader(units: Quantities) -> Callable[[bytes], Reading]:
 
 
 def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] | None:
-    """Return the reader of the lines below a header row; None if it is none.
-
-    Args:
-        header: the first line.
-        units: of the calibration: force and deformation, or torque and angle.
-    """
-    names = (*_REQUIRED, *_OTHERS, *(() if units.is_force else ("angle", "torque")))
+    """Return the reader of the lines below a header row; None if it is none."""
+    names = *_REQUIRED, *_OTHERS, *(() if units.is_force else ("angle", "torque"))
     try:
         grid, _ = text_grid(header.decode("utf-8-sig").strip())
         with FileFindings("standard input") as wrong:
@@ -106,19 +99,17 @@ def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] |
         cells = split_line(line.decode().strip("\r\n"), separator)
         if len(cells) != grid.width:
             raise ValueError(f"{len(cells)} cells where the header has {grid.width}")
-        numbers, labels = {}, {}
+        found: dict[str, Any] = {n: cells[c.position] for n, c in columns.items()}
         for quantity, column in columns.items():
-            cell = cells[column.position]
             if column.unit is None:
-                labels[quantity] = cell
                 continue
             # A decimal sign holds for the whole stream once a comma was one.
-            comma |= separator != "," and "," in cell
+            comma |= separator != "," and "," in found[quantity]
             try:
-                number = np.array([read_number(cell, comma)])
+                number = np.array([read_number(found[quantity], comma)])
             except CellError as error:
                 raise ValueError(f"{quantity}: {error.args[0]}") from None
-            numbers[quantity] = float(column.unit.convert(number)[0])
-        return Reading(**numbers, **labels)
+            found[quantity] = float(column.unit.convert(number)[0])
+        return Reading(**found)
 
     return read

@@ -17,11 +17,12 @@ from hdcal.tracking.draw_forces import draws_of
 from hdcal.tracking.first_bank import first_bank
 
 SCHEMA = "hdcal.track/1"
-ALARM_ROWS = 10_000.0
 # Rows that one compiled program takes, beside a single one.
 _BLOCK = 1024
 # Below this effective number of draws their spread is no posterior's.
 _LEAST_DRAWS = 5.0
+# Margins of the tested deformation [mm] and temperature [K].
+_MARGIN = np.array([1e-9, 1.0])
 
 
 def _number(name: str, **more: Any) -> Any:
@@ -59,7 +60,6 @@ class Tracker:
         alarm_rows: mean number of readings between false alarms, 10 to 10⁹.
         reopen: after an alarm the stiffness may have moved by this share of itself
             (one sd), and the zero as with a new mounting; 0 = an alarm changes nothing.
-        seed: of what is drawn from priors.
 
     Attributes:
         units: names and units of what is read.
@@ -76,25 +76,19 @@ class Tracker:
     """
 
     def __init__(
-        self,
-        known: Models,
-        *,
-        alarm_rows: float = ALARM_ROWS,
-        reopen: float = 0.0,
-        seed: int = 0,
+        self, known: Models, *, alarm_rows: float = 10_000.0, reopen: float = 0.0
     ):
         with Findings() as wrong:
             wrong += implausible("alarm_rows", alarm_rows)
-            wrong += implausible("reopen", reopen) + implausible("seed", seed)
-        every, self.notes = draws_of(known, seed)
+            wrong += implausible("reopen", reopen)
+        every, self.notes = draws_of(known)
         self._draws, self._bank = first_bank(every, threshold_for(alarm_rows), reopen)
         self.units, rows = every.case.units, every.case.records
         self._keys = self.units.key("stiffness_N_per_mm"), self.units.key("force_N")
         self._reference = every.case.gear.reference_temperature
-        self._tested = [
-            (np.min(each) - margin, np.max(each) + margin)
-            for each, margin in ((rows.deformation, 1e-9), (rows.temperature, 1.0))
-        ]
+        tested = np.stack([rows.deformation, rows.temperature])
+        self._low = np.min(tested, axis=1) - _MARGIN
+        self._high = np.max(tested, axis=1) + _MARGIN
         mean, scale = map(float, self._bank.stiffness_now)
         self.stiffness = mean, scale * float(stdtrit(2.0 * self._bank.shape, 0.975))
         self._alarm_rows, self._since = alarm_rows, 1
@@ -152,8 +146,8 @@ class Tracker:
     def _found(self, rows: np.ndarray) -> list[dict[str, float]]:
         """Return FIELDS, half-width of an interval in scales, and tested, of rows."""
         count = len(rows)
-        low, high = np.array(self._tested).T
-        tested = np.all((low <= rows[:, :2]) & (rows[:, :2] <= high), axis=1)
+        where = rows[:, :2]
+        tested = np.all((self._low <= where) & (where <= self._high), axis=1)
         padded = np.zeros((1 if count == 1 else _BLOCK, rows.shape[1]))
         padded[:count] = rows
         at, warm, force, follows, remounted = padded.T
