@@ -13,7 +13,6 @@ from hdcal.cli.options import json_option
 @click.argument("known", metavar="RUN")
 @click.option(
     "--alarm-rows",
-    type=float,
     default=10_000.0,
     show_default=True,
     metavar="ROWS",
@@ -21,7 +20,6 @@ from hdcal.cli.options import json_option
 )
 @click.option(
     "--reopen",
-    type=float,
     default=0.0,
     show_default=True,
     metavar="SHARE",

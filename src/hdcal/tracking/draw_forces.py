@@ -151,7 +151,7 @@ def _leftover(discrepancy: Discrepancy, values: Values, case: Case):
 
 
 @jax.jit
-def _forces(problem: Problem, values: Values, parts, untested, rows):
+def _forces(problem: Problem, values: Values, parts, untested: Untested, rows):
     at, warm = rows
     records = grid_records(at, warm, jnp.where(at < 0.0, -1.0, 1.0), 0.0)
     draw = partial(_force, problem, parts, untested, records)

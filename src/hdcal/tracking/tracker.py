@@ -115,22 +115,19 @@ class Tracker:
         Returns:
             A line of `hdcal track` for each, as plain data.
         """
-        starts = range(0, len(readings), _BLOCK)
-        return [line for i in starts for line in self._block(readings[i : i + _BLOCK])]
-
-    def _block(self, readings: Sequence[Reading | str]) -> list[dict[str, Any]]:
-        """Answer a block of readings with one call of the compiled program."""
-        answers, good = [], []
+        answers, good, rows = [], [], []
         for reading in readings:
             self.rows += 1
             answers.append({"schema": SCHEMA, "status": "error", "row": self.rows})
             if isinstance(reading, str):
                 answers[-1]["error"], self._follows = reading, False
             else:
-                good.append((answers[-1], self._as_row(reading)))
-        if good:
-            found = self._found(np.array([row for _, row in good]))
-            for (answer, _), line in zip(good, found, strict=True):
+                good.append(answers[-1])
+                rows.append(self._as_row(reading))
+        for first in range(0, len(rows), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found = self._found(np.array(rows[block]))
+            for answer, line in zip(good[block], found, strict=True):
                 self._fill(answer, line)
         return answers
 
