@@ -194,9 +194,9 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("chains", "warmup", "draws", "seed"),
     ),
     (
-        lambda run, **asked: hdcal.Tracker(run.case.gear, **{"seed": -1, **asked}),
+        lambda run, **asked: hdcal.Tracker(run, **{"reopen": -1.0, **asked}),
         {},
-        ("alarm_rows", "forget", "reopen", "seed"),
+        ("alarm_rows", "reopen"),
     ),
     (
         lambda run, **asked: hdcal.fit(run.case, **asked),

@@ -173,7 +173,7 @@ def attack_lines(rng: random.Random, targets: Path) -> list[str]:
     if rng.random() < 0.3:
         lines.append(damaged_bytes(json.dumps(READING).encode(), rng))
     Path("lines").write_bytes(b"\n".join(lines) + b"\n")
-    return ["track", "--gear", str(targets / "case/gear.toml")]
+    return ["track", str(targets / "posterior.nc")]
 
 
 def attack_options(rng: random.Random, targets: Path) -> list[str]:

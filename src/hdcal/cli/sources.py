@@ -1,9 +1,8 @@
-"""What a command starts from: the result of an earlier one, or a gear file."""
+"""What a command starts from: the result of an earlier one."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hdcal.data.case import Gear
     from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
 
@@ -20,14 +19,3 @@ def load_usable(run: str) -> "Posterior | ModelAverage":
     models = load_models(run)
     models.require_usable()
     return models
-
-
-def load_gear(path: str) -> "Gear":
-    """Read a gear file.
-
-    Raises:
-        InputError: it cannot be used.
-    """
-    from hdcal.data.gear import read_gear
-
-    return read_gear(path)

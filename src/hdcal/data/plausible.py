@@ -115,7 +115,6 @@ RANGES = {
     "jobs": Range(1, 256, "", "processes of one machine"),
     "degree": Range(1, 9, "", "higher ones leave no digits"),
     "alarm_rows": Range(10.0, 1e9, "", "less is noise, more is never"),
-    "forget": Range(0.5, 1.0, "", "0.999 keeps about the last thousand readings"),
     "reopen": Range(0.0, 1.0, "", "a share of the stiffness, such as 0.1"),
 }
 # Parameters, keys of files and options that are such a quantity under another name.

@@ -1,113 +1,115 @@
-"""Readings as JSON or CSV in, what the tracker makes of them as JSON lines out."""
+"""Lines of JSON or CSV in, lines of JSON out, as fast as they come."""
 
 import json
-from collections.abc import Iterator
-from itertools import chain
+from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO, TextIO
 
-from hdcal.tracking.csv_lines import csv_lines
-from hdcal.tracking.tracker import SCHEMA, Tracker
+import numpy as np
+from pydantic import ConfigDict, ValidationError
 
-# A longer line is no reading; the rest of it is thrown away unread.
+from hdcal.data.findings import FileFindings
+from hdcal.data.tables.cells import CellError, read_number
+from hdcal.data.tables.columns import choose_columns, in_place_of_force
+from hdcal.data.tables.grid import split_line
+from hdcal.data.tables.shapes import table_of
+from hdcal.data.tables.text import text_grid
+from hdcal.errors import InputError
+from hdcal.quantities import Quantities
+from hdcal.tracking.tracker import Reading, Tracker
+
+# A longer line is no reading; of the rest of it nothing is kept.
 _LONGEST = 1 << 16
 _ENCODER = json.JSONEncoder(allow_nan=False)
-_EXAMPLE = '{"deformation_mm": 0.1, "force_N": 19.8}'
-_NUMBERS = {"deformation_mm": "deformation", "force_N": "force"}
-_OPTIONAL = {"temperature_C": "temperature", "time_s": "time"}
+_REQUIRED, _OTHERS = ("deformation", "force"), ("temperature", "run")
 
 
 def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
-    """Answer every line that is not blank, good or bad, before the next is read.
+    """Answer every line that is not blank, as soon as it is there.
 
-    A bad line is answered by what is wrong with it; nothing is learned from it, and
-    the stream goes on. Rows count all lines that are answered.
-
-    Args:
-        tracker: that takes the readings.
-        source: JSON objects with `deformation_mm` and `force_N`, and where known
-            `temperature_C`, `time_s` and `run`; or a header row and lines of CSV.
-        sink: takes a line for each.
+    The source holds JSON objects, or a header row and lines of CSV.
 
     Returns:
-        How many lines were no reading.
+        Number of lines that were no reading.
     """
-    bad = 0
-    lines = _lines(source)
-    first = next(lines, None)
-    table = None if first is None else csv_lines(first)
-    if first is not None and table is None:
-        lines = chain([first], lines)
-    for line in lines:
-        try:
-            plain = read_line(line) if table is None else table.read(_text(line))
-            found = tracker.update(**plain)
-        except ValueError as error:
-            bad += 1
-            found = {"schema": SCHEMA, "status": "error", "row": tracker.skip()}
-            found["error"] = str(error)
-        sink.write(_ENCODER.encode(found) + "\n")
+    bad, of_json, of_table, first = 0, json_reader(tracker.units), None, True
+    for lines in _blocks(source):
+        if first and lines:
+            of_table, first = csv_reader(lines[0], tracker.units), False
+            lines = lines[1:] if of_table else lines
+        read = of_table or of_json
+        answers = tracker.follow([_attempt(read, line) for line in lines])
+        bad += sum(answer["status"] != "ok" for answer in answers)
+        sink.writelines(_ENCODER.encode(answer) + "\n" for answer in answers)
         sink.flush()
     return bad
 
 
-def _text(line: bytes) -> str:
-    """Return a line as text.
+def _blocks(source: BinaryIO) -> Iterator[list[bytes]]:
+    """Yield the lines that have come so far, without the blank ones."""
+    buffered: Any = source
+    rest = b""
+    while chunk := buffered.read1(_LONGEST):
+        *lines, rest = (rest + chunk).split(b"\n")
+        rest = rest[: _LONGEST + 1]
+        yield [line for line in lines if line.strip()]
+    yield [rest] if rest.strip() else []
 
-    Raises:
-        ValueError: it is too long, or none.
-    """
+
+def _attempt(read: Callable[[bytes], Reading], line: bytes) -> Reading | str:
+    """Return the reading of a line, or why it is none."""
     if len(line) > _LONGEST:
-        raise ValueError(f"the line is longer than {_LONGEST} bytes")
+        return f"the line is longer than {_LONGEST} bytes"
     try:
-        return line.decode().strip("\r\n")
-    except UnicodeDecodeError:
-        raise ValueError("the line is no UTF-8 text") from None
+        return read(line)
+    except ValidationError as error:
+        problems = [(*each["loc"], each["msg"]) for each in error.errors()]
+        return "; ".join(": ".join(map(str, problem)) for problem in problems)
+    except ValueError as error:
+        return str(error)
 
 
-def read_line(line: bytes) -> dict[str, Any]:
-    """Return the arguments of `Tracker.update` from a line.
+def json_reader(units: Quantities) -> Callable[[bytes], Reading]:
+    """Return the reader of lines of JSON with keys such as `force_N`."""
+    names = {"deformation": units.key("deformation_mm"), "force": units.key("force_N")}
+    names |= {"temperature": "temperature_C"}
 
-    Raises:
-        ValueError: it is no JSON object with the numbers of a reading.
-    """
-    if len(line) > _LONGEST:
-        raise ValueError(f"the line is longer than {_LONGEST} bytes")
-    try:
-        plain = json.loads(line)
-    except (ValueError, RecursionError):
-        words = (
-            "the line is no JSON, nor of a table whose first row names deformation and "
-            "force; one reading is one line such as"
+    class JsonReading(Reading):
+        model_config = ConfigDict(
+            extra="ignore", alias_generator=lambda name: names.get(name, name)
         )
-        raise ValueError(f"{words} {_EXAMPLE}") from None
-    if not isinstance(plain, dict):
-        raise ValueError(f"the line is no object such as {_EXAMPLE}")
-    missing = [name for name in _NUMBERS if plain.get(name) is None]
-    if missing:
-        raise ValueError(f"{' and '.join(missing)} missing")
-    found: dict[str, Any] = {}
-    for name, argument in (_NUMBERS | _OPTIONAL).items():
-        value = plain.get(name)
-        if value is None:
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{name} is no number")
-        try:
-            found[argument] = float(value)
-        except OverflowError:
-            raise ValueError(f"{name} is too large") from None
-    run = plain.get("run")
-    if run is not None:
-        if not isinstance(run, str | int) or isinstance(run, bool):
-            raise ValueError("run is no label")
-        found["run"] = str(run)
-    return found
+
+    return JsonReading.model_validate_json
 
 
-def _lines(stream: BinaryIO) -> Iterator[bytes]:
-    while line := stream.readline(_LONGEST + 1):
-        rest = line
-        while len(rest) > _LONGEST and not rest.endswith(b"\n"):
-            rest = stream.readline(_LONGEST + 1)
-        if line.strip():
-            yield line
+def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] | None:
+    """Return the reader of the lines below a header row; None if it is none."""
+    names = *_REQUIRED, *_OTHERS, *(() if units.is_force else ("angle", "torque"))
+    try:
+        grid, _ = text_grid(header.decode("utf-8-sig").strip())
+        with FileFindings("standard input") as wrong:
+            used = choose_columns(table_of(grid, wrong), {}, names, _REQUIRED, wrong)
+    except (UnicodeDecodeError, InputError):
+        return None
+    if ("torque" in used) == units.is_force:
+        return None
+    columns, separator, comma = in_place_of_force(used), grid.separator, False
+
+    def read(line: bytes) -> Reading:
+        nonlocal comma
+        cells = split_line(line.decode().strip("\r\n"), separator)
+        if len(cells) != grid.width:
+            raise ValueError(f"{len(cells)} cells where the header has {grid.width}")
+        found: dict[str, Any] = {n: cells[c.position] for n, c in columns.items()}
+        for quantity, column in columns.items():
+            if column.unit is None:
+                continue
+            # A decimal sign holds for the whole stream once a comma was one.
+            comma |= separator != "," and "," in found[quantity]
+            try:
+                number = np.array([read_number(found[quantity], comma)])
+            except CellError as error:
+                raise ValueError(f"{quantity}: {error.args[0]}") from None
+            found[quantity] = float(column.unit.convert(number)[0])
+        return Reading(**found)
+
+    return read

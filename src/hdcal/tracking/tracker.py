@@ -1,56 +1,73 @@
 """Follow a gear reading by reading: stiffness, the next force, and a change alarm."""
 
-from math import inf, isfinite, sqrt
+from collections.abc import Sequence
+from math import inf, sqrt
+from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat
+from scipy.special import stdtrit
 
-from hdcal.data.case import Gear
-from hdcal.data.plausible import implausible
+from hdcal.data.plausible import implausible, range_of
 from hdcal.errors import Findings
-from hdcal.prediction.engine.models import Models
-from hdcal.prediction.engine.untested_reading import UNKNOWNS
-from hdcal.tracking.beginning import begin_core, begin_prior, usual_design
-from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
-from hdcal.tracking.coarse_rounding import CoarseRounding
-from hdcal.tracking.first_rows import FirstRows
-from hdcal.tracking.followed_causes import followed_causes
-from hdcal.tracking.forgetting_alarm import forgetting_threshold, settling_rows
-from hdcal.tracking.full_scale import AssumedFullScale
-from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
-from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
-from hdcal.tracking.reading_limits import reading_limits
-from hdcal.tracking.serial_correlation import SerialCorrelation
-from hdcal.tracking.unequal_rows import RowTerms, UnequalRows
+from hdcal.prediction.models import Models
+from hdcal.tracking.bank import CELL, FIELDS, follow_rows
+from hdcal.tracking.change_alarm import threshold_for
+from hdcal.tracking.draw_forces import draws_of
+from hdcal.tracking.first_bank import first_bank
 
 SCHEMA = "hdcal.track/1"
-ALARM_ROWS = 10_000.0
-# With forgetting the threshold is taken anew when the correlation has changed by this.
-_ANOTHER_CORRELATION = 0.1
-# Errors that repeat with the force, by more than this share, are no correlated noise.
-_MOST_REPEATED = 0.1
+# Rows that one compiled program takes, beside a single one.
+_BLOCK = 1024
+# Below this effective number of draws their spread is no posterior's.
+_LEAST_DRAWS = 5.0
+# Margins of the tested deformation [mm] and temperature [K].
+_MARGIN = np.array([1e-9, 1.0])
+
+
+def _number(name: str, **more: Any) -> Any:
+    """Return a field of a reading with its plausible range."""
+    return Field(ge=range_of(name).low, le=range_of(name).high, **more)
+
+
+class Reading(BaseModel):
+    """A reading of a stream.
+
+    Attributes:
+        deformation: as read [mm].
+        force: as read [N].
+        temperature: of the specimen [°C]; None for the reference temperature.
+        run: label of the mounting; with another one the zero may have moved.
+    """
+
+    model_config = ConfigDict(
+        allow_inf_nan=False, coerce_numbers_to_str=True, extra="forbid"
+    )
+
+    deformation: StrictFloat = _number("deformation")
+    force: StrictFloat = _number("force")
+    temperature: StrictFloat | None = _number("temperature", default=None)
+    run: str | None = None
 
 
 class Tracker:
-    """Update the stiffness with every reading, and call when something changed.
+    """Update the stiffness with every reading, and raise an alarm at a change.
 
-    Without effects the update is exact: after any number of rows it is what a batch
-    fit of all of them gives, under a normal prior of the linear coefficients and an
-    inverse-gamma one of the noise variance, with the moments of what the tracker began
-    with; of several causes each has its own, weighted. With effects it is a set of
-    weighted particles. Memory does not grow with the rows.
+    Memory does not grow with the rows.
 
     Args:
-        known: a calibration, or a gear whose priors are all there is.
+        known: a calibration, or several with probabilities.
         alarm_rows: mean number of readings between false alarms, 10 to 10⁹.
-        forget: share of the past kept at each reading, 0.5 to 1 = all.
         reopen: after an alarm the stiffness may have moved by this share of itself
-            (one sd), and the zero as with a new mounting; 0 = no alarm changes what
-            is known.
-        seed: of the draws that the beginning is matched to.
+            (one sd), and the zero as with a new mounting; 0 = an alarm changes nothing.
 
     Attributes:
-        rows: how many rows were counted.
-        alarms: how many times the alarm called.
+        units: names and units of what is read.
+        notes: sentences on the models.
+        stiffness: at the start, mean and half-width of its 95 % interval [N/mm].
+        rows: number of rows so far.
+        readings: number of rows that were readings.
+        alarms: number of alarms so far.
 
     Raises:
         NotUsable: the calibration failed its checks.
@@ -59,242 +76,120 @@ class Tracker:
     """
 
     def __init__(
-        self,
-        known: Models | Gear,
-        *,
-        alarm_rows: float = ALARM_ROWS,
-        forget: float = 1.0,
-        reopen: float = 0.0,
-        seed: int = 0,
+        self, known: Models, *, alarm_rows: float = 10_000.0, reopen: float = 0.0
     ):
         with Findings() as wrong:
             wrong += implausible("alarm_rows", alarm_rows)
-            wrong += implausible("forget", forget) + implausible("reopen", reopen)
-            wrong += implausible("seed", seed)
-        self._causes, self._unequal = [], None
-        if isinstance(known, Gear):
-            begin, prior = known, begin_prior(known, seed)
-        else:
-            begin, self._causes = followed_causes(known, forget)
-            prior = begin_prior(begin, seed)
-            self._unequal = UnequalRows(begin, prior)
-        self._unknowns, self._full_scale = False, AssumedFullScale(begin)
-        self._core, self._columns = begin_core(begin, prior, forget, self._unequal)
-        self._slow, self._noise = self._core.slower(), SerialCorrelation()
-        self._rounding = CoarseRounding(prior.step, forget)
-        self._limits = reading_limits(begin, prior)
-        self._reference = prior.reading.reference_temperature
-        self._remounting = prior.remounting
-        self._alarm_rows = alarm_rows
-        self._alarm = ChangeAlarm(threshold_for(alarm_rows))
-        self._design = usual_design(begin, prior, self._unequal)
-        self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
-        self._since, self._run = 1, None
-        self._forget, self._reopen = forget, reopen
-        self._threshold_for = inf
-        self._first = self._core.coefficient(STIFFNESS)[2]
-        self.rows = self.alarms = self._readings = 0
+            wrong += implausible("reopen", reopen)
+        every, self.notes = draws_of(known)
+        self._draws, self._bank = first_bank(every, threshold_for(alarm_rows), reopen)
+        self.units, rows = every.case.units, every.case.records
+        self._keys = self.units.key("stiffness_N_per_mm"), self.units.key("force_N")
+        self._reference = every.case.gear.reference_temperature
+        tested = np.stack([rows.deformation, rows.temperature])
+        self._low = np.min(tested, axis=1) - _MARGIN
+        self._high = np.max(tested, axis=1) + _MARGIN
+        mean, scale = map(float, self._bank.stiffness_now)
+        self.stiffness = mean, scale * float(stdtrit(2.0 * self._bank.shape, 0.975))
+        self._alarm_rows, self._since = alarm_rows, 1
+        self._follows, self._run = False, None
+        self.rows = self.readings = self.alarms = 0
 
-    def update(
-        self,
-        deformation: float,
-        force: float,
-        *,
-        temperature: float | None = None,
-        time: float | None = None,
-        run: str | None = None,
-    ) -> dict:
-        """Take one reading.
-
-        Args:
-            deformation: as read [mm].
-            force: as read [N].
-            temperature: of the specimen [°C]; by default the reference one.
-            time: since the reset of the rig [s]; only some effects look at it.
-            run: label of the mounting; another one widens the zero of the force.
+    def update(self, deformation: float, force: float, **more) -> dict[str, Any]:
+        """Take one reading; its numbers, and what else it may have, are at `Reading`.
 
         Returns:
-            The answer as plain data: a line of `hdcal track`.
+            A line of `hdcal track`, as plain data.
 
         Raises:
-            ValueError: a number is missing or none of this gear; nothing was learned.
+            ValueError: a number is missing or implausible; nothing was learned.
         """
-        warmth = self._reference if temperature is None else temperature
-        self._limits.check(deformation, force, temperature, time)
-        self._mount(run)
-        tested = self._limits.were_tested(deformation, warmth)
-        self._noise.follow(time)
-        columns, terms = self._row(deformation, warmth, time or 0.0, tested=tested)
-        rho, weight = self._noise.value, self._noise.weight
-        middle, half, score = self._step(columns, force, terms)
-        share, alarm = self._alarm.step(weight * score)
-        found = {
-            "schema": SCHEMA,
-            "status": "ok",
-            "row": self.rows,
-            "stiffness_N_per_mm": self._stiffness(),
-            "force_N": _force(middle, half),
-            "innovation": score,
-            "alarm": alarm,
-            "alarm_score": share,
-            "alarm_since_row": self._since,
-            "false_alarm_rows": self._alarm_rows,
-            "correlation": rho,
-            "tested": tested,
-        }
-        if alarm:
-            self._restart()
-        return found | _degeneracy(self._core, found["stiffness_N_per_mm"])
+        return self.follow([Reading(deformation=deformation, force=force, **more)])[0]
 
-    def _row(
-        self, deformation: float, warmth: float, time: float, *, tested: bool | None
-    ) -> tuple[np.ndarray, RowTerms]:
-        """Count a row; return its columns, and what it has beside the model."""
-        self.rows, self._readings = self.rows + 1, self._readings + 1
-        terms = RowTerms()
-        if self._unequal is not None:
-            terms = self._unequal.at(deformation, warmth, tested=tested)
-        columns = self._columns(deformation, warmth - self._reference, time)
-        return self._with_unknowns(columns, terms), terms
+    def follow(self, readings: Sequence[Reading | str]) -> list[dict[str, Any]]:
+        """Take readings in their order, which is faster than one by one.
 
-    def _with_unknowns(self, columns: np.ndarray, terms: RowTerms) -> np.ndarray:
-        """Return the columns beside those of what untested conditions add.
-
-        The unknowns come with the first untested row: until then none says anything.
-        """
-        if not self._unknowns:
-            if terms.columns is None:
-                return columns
-            self._unknowns = True
-            self._design = np.pad(self._design, ((0, 0), (0, UNKNOWNS)))
-            for core in {self._core, self._slow}:
-                core.add_unknowns(UNKNOWNS)
-            self._noise.restart()
-        own = np.zeros(UNKNOWNS) if terms.columns is None else terms.columns
-        own = np.broadcast_to(own, (*columns.shape[:-1], UNKNOWNS))
-        return np.concatenate([columns, own], axis=-1)
-
-    def _step(
-        self, columns, force: float, terms: RowTerms
-    ) -> tuple[float, float, float]:
-        """Predict a row from the rows before it, then learn from it.
+        Args:
+            readings: each a reading, or why a line is none.
 
         Returns:
-            Middle [N], half-width of the 95 % interval [N], normal score.
+            A line of `hdcal track` for each, as plain data.
         """
-        self._full_scale.see(force)
-        shift, weight = terms.shift, terms.weight
-        columns, force = columns * weight, (force - shift) * weight
-        expected = self._slow.expect(columns)
-        repeated = self._rounding.share(self._slow.variance() * terms.noise)
-        told = self._rounding.weight(expected / weight + shift, repeated)
-        row = self._noise.whiten(columns, force)
-        middle, half, score = self._core.step(row.columns, row.force, told)
-        if self._slow is not self._core:
-            self._slow.step(row.columns, row.force, told)
-        if repeated < _MOST_REPEATED:
-            self._noise.learn((force - expected) / half)
-        if isinstance(self._core, FirstRows) and self._core.complete:
-            self._core = self._core.merged(self._forget)
-            self._slow = self._core.slower()
-        self._set_threshold()
-        middle, half = row.carried + row.scale * middle, row.scale * half
-        return middle / weight + shift, half / weight, score
+        answers, good, rows = [], [], []
+        for reading in readings:
+            self.rows += 1
+            answers.append({"schema": SCHEMA, "status": "error", "row": self.rows})
+            if isinstance(reading, str):
+                answers[-1]["error"], self._follows = reading, False
+            else:
+                good.append(answers[-1])
+                rows.append(self._as_row(reading))
+        for first in range(0, len(rows), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found = self._found(np.array(rows[block]))
+            for answer, line in zip(good[block], found, strict=True):
+                self._fill(answer, line)
+        return answers
 
-    def _set_threshold(self) -> None:
-        """Take the threshold of a core that forgets, once it has settled."""
-        if self._forget == 1.0 or self._readings <= settling_rows(self._forget):
-            return
-        rho = self._noise.value
-        moved = abs(rho - self._threshold_for) > _ANOTHER_CORRELATION
-        if moved and isinstance(self._core, LinearCore):
-            self._threshold_for = rho
-            self._alarm.threshold = forgetting_threshold(
-                self._core.prior, self._forget, self._design, self._alarm_rows, rho
-            )
+    def _as_row(self, reading: Reading) -> tuple[float, ...]:
+        """Return deformation, temperature, force, and flags: follows, remounted."""
+        remounted = None is not self._run != reading.run is not None
+        self._run = self._run if reading.run is None else reading.run
+        follows, self._follows = self._follows and not remounted, True
+        warm = reading.temperature
+        warm = self._reference if warm is None else warm
+        return reading.deformation, warm, reading.force, follows, remounted
 
-    def skip(self) -> int:
-        """Count a row that was no reading, and return its number."""
-        self.rows += 1
-        self._noise.restart()
-        return self.rows
+    def _found(self, rows: np.ndarray) -> list[dict[str, float]]:
+        """Return FIELDS, half-width of an interval in scales, and tested, of rows."""
+        count = len(rows)
+        where = rows[:, :2]
+        tested = np.all((self._low <= where) & (where <= self._high), axis=1)
+        padded = np.zeros((1 if count == 1 else _BLOCK, rows.shape[1]))
+        padded[:count] = rows
+        at, warm, force, follows, remounted = padded.T
+        forces = self._draws.at(at, warm)
+        width = CELL * float(self._bank.step) or inf
+        cell = np.round(np.asarray(forces.mean).mean(axis=1) / width).astype(int)
+        inputs = {"force": force, "forces": forces, "cell": cell}
+        inputs |= {"follows": follows > 0.0, "remounted": remounted > 0.0}
+        self._bank, found = follow_rows(self._bank, inputs, count)
+        found = np.asarray(found)[:count]
+        half = stdtrit(found[:, FIELDS.index("freedom")], 0.975)
+        names = (*FIELDS, "half", "tested")
+        lines = np.column_stack([found, half, tested]).tolist()
+        return [dict(zip(names, line, strict=True)) for line in lines]
 
-    def describe(self) -> str:
-        """Return in words where the tracker begins and what its alarm promises."""
-        mean, _, half = self._core.coefficient(STIFFNESS)
-        words = [
-            f"begins with {self._source}: stiffness {mean:.4g} N/mm, 95 % credible "
-            f"interval {mean - half:.4g} … {mean + half:.4g}, on a mounting that was "
-            f"not tested; one false alarm in {self._alarm_rows:g} readings"
-        ]
-        return "\n".join(words + self._full_scale.at_start() + self._causes)
-
-    def summary(self) -> str:
-        """Say how many alarms there were, and how many are due by chance."""
-        due = self._readings / self._alarm_rows
-        words = (
-            f"{self.rows} rows, {self.alarms} alarms; without a change {due:.2g} false "
-            f"ones are due in {self._readings} readings"
-        )
-        if rho := self._noise.value:
-            words += (
-                f"; readings are correlated with the one before ({rho:.2f}), which is "
-                "taken into account"
-            )
-        # Three sds of a Poisson number above what is due are no chance.
-        many = self.alarms > due + 3.0 * sqrt(due)
-        if many and not self._reopen and self._forget == 1.0:
-            words += (
-                "; a change is followed slowly, and may look like correlation: with "
-                "`reopen` above 0 a changed gear is learned anew"
-            )
-        return words + self._full_scale.at_end()
-
-    def _mount(self, run: str | None) -> None:
-        """Widen the zero of the force if the label of the mounting is another one."""
-        if run is None or run == self._run:
-            return
-        if self._run is not None:
-            self._widen(ZERO, self._remounting)
-            self._noise.restart()
-            self._rounding.restart()
-        self._run = run
-
-    def _widen(self, index: int, variance: float) -> None:
-        self._core.widen(index, variance)
-        if self._slow is not self._core:
-            self._slow.widen(index, variance)
-
-    def _restart(self) -> None:
-        """Begin anew to look for a change; widen what may have changed, if wanted."""
-        self.alarms += 1
-        self._since = self.rows + 1
-        if self._reopen:
-            moved = self._reopen * self._core.coefficient(STIFFNESS)[0]
-            self._widen(STIFFNESS, moved**2)
-            self._widen(ZERO, self._remounting)
-            self._rounding.restart()
-
-    def _stiffness(self) -> dict:
-        mean, sd, half = self._core.coefficient(STIFFNESS)
-        return {
+    def _fill(self, answer: dict[str, Any], found: dict[str, float]) -> None:
+        """Complete the answer to a reading."""
+        force, spread = found["force"], found["half"] * found["force_scale"]
+        mean, scale = found["stiffness"], found["stiffness_scale"]
+        half, freedom = found["half"] * scale, found["freedom"]
+        stiffness = {
             "mean": mean,
-            "sd": sd if isfinite(sd) else None,
+            "sd": scale * sqrt(freedom / (freedom - 2.0)),
             "credible_95": [mean - half, mean + half],
-            "narrowed": 1.0 - half / self._first if self._first else 0.0,
+            "narrowed": 1.0 - half / self.stiffness[1],
         }
-
-
-def _force(middle: float, half: float) -> dict:
-    return {"predicted": middle, "predictive_95": [middle - half, middle + half]}
-
-
-def _degeneracy(core, stiffness: dict) -> dict:
-    if not isinstance(core, Particles):
-        return {}
-    effective = core.effective
-    degenerate = effective < LEAST_EFFECTIVE
-    if degenerate:
-        # A few draws are left: their spread is no posterior's.
-        stiffness |= {"sd": None, "credible_95": None, "narrowed": None}
-    return {"effective_particles": effective, "degenerate": degenerate}
+        band = [force - spread, force + spread]
+        alarm = bool(found["alarm"])
+        answer |= {
+            "status": "ok",
+            self._keys[0]: stiffness,
+            self._keys[1]: {"predicted": force, "predictive_95": band},
+            "innovation": found["innovation"],
+            "alarm": alarm,
+            "alarm_score": found["score"],
+            "alarm_since_row": self._since,
+            "false_alarm_rows": self._alarm_rows,
+            "correlation": found["correlation"],
+            "tested": bool(found["tested"]),
+        }
+        if any(effect.stage != "noise" for effect in self._draws.problem.effects):
+            few = found["draws"] < _LEAST_DRAWS
+            answer |= {"effective_particles": found["draws"], "degenerate": few}
+            if few:
+                stiffness |= dict.fromkeys(("sd", "credible_95", "narrowed"))
+        self.readings += 1
+        self.alarms += alarm
+        self._since = answer["row"] + 1 if alarm else self._since

@@ -1,0 +1,223 @@
+"""The readings that posterior draws expect at rows of a stream."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.case import Case
+from hdcal.data.records import Array
+from hdcal.errors import Finding, InputError
+from hdcal.inference.discrepancy import Discrepancy
+from hdcal.inference.distributions import moments
+from hdcal.inference.gauges import as_read
+from hdcal.inference.problem import Problem
+from hdcal.inference.residuals import noise_warnings
+from hdcal.inference.values import Values
+from hdcal.prediction.forces import force_of, grid_records
+from hdcal.prediction.joint import join
+from hdcal.prediction.models import Model, Models, averaging_words, models_of
+from hdcal.prediction.simulate import draw_scores, rig_drifts
+
+# Models with more than this probability have to be ones that a stream can follow.
+_LEAST_FOLLOWED = 0.5
+# Parts of a leftover discrepancy below this share of the noise are left out.
+_SMALL = 0.03
+# Site of the sd of the zero from one mounting to the next [N].
+MOUNTING = "run_offset_sd"
+
+
+class RowForces(NamedTuple):
+    """Readings that draws expect at rows.
+
+    Attributes:
+        mean: reading [N].
+        slope: its derivative by the stiffness, relative to that of the draw [N].
+        excess: variance of a reading beyond that of one without load [N²].
+        extrapolation: sd of the error at untested conditions, with the sign of the side
+            on which these lie [N].
+        columns: of the coefficients of the leftover discrepancy [N].
+    """
+
+    mean: Float[Array, "n draw"]
+    slope: Float[Array, "n draw"]
+    excess: Float[Array, "n draw"]
+    extrapolation: Float[Array, "n draw"]
+    columns: Float[Array, "n draw c"]
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Draws of the models of a case.
+
+    Attributes:
+        case: that was calibrated.
+        problem: structure of the model with all effects.
+        models: that are followed.
+        model: number of the model of each draw, shape (draw,).
+        values: parameters by site, [draw, …]; of a leftover discrepancy the mean.
+        scores: coefficients of the leftover discrepancy, of unit variance, (draw, c).
+        parts: weights that belong to each of these, shape (weight, c).
+        bend: level of its law and normal score of each draw, (draw, 2).
+    """
+
+    case: Case
+    problem: Problem
+    models: tuple[Model, ...]
+    model: np.ndarray
+    values: Values
+    scores: np.ndarray
+    parts: np.ndarray
+    bend: np.ndarray
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness as read at the reference temperature [N/mm]."""
+        unit = float(self.problem.unit_stiffness) * self.problem.reading.radial_per_read
+        return as_read(self.values, self.values["K"] * self.values["E0"] * unit)
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance of a reading without load, rounding included [N²]."""
+        rounding = float(self.problem.step) ** 2 / 12.0
+        return self.values["sigma"] ** 2 + rounding
+
+    def take(self, rows: np.ndarray) -> "Draws":
+        """Return some of the draws."""
+        values = {name: column[rows] for name, column in self.values.items()}
+        scores, model, bend = self.scores[rows], self.model[rows], self.bend[rows]
+        return replace(self, values=values, scores=scores, model=model, bend=bend)
+
+    def at(self, deformation, temperature) -> RowForces:
+        """Return the readings that the draws expect.
+
+        Args:
+            deformation: as read, shape (n,) [mm].
+            temperature: of the specimen, shape (n,) [°C].
+        """
+        records = self.case.records
+        low, high = np.min(records.deformation), np.max(records.deformation)
+        warm = np.asarray(records.temperature)
+        kelvins = temperature - np.clip(temperature, warm.min(), warm.max())
+        _, near = self._bends(np.clip(deformation, low, high))
+        mean, far = self._bends(deformation)
+        # Inside the range each draw has a bend of its own, beyond it one unknown more.
+        drifts = np.stack([self._drift(name) for name in ("zero_drift", "frame_drift")])
+        shift = mean + near * self.bend[:, 1:] * np.where(deformation < 0.0, -1.0, 1.0)
+        beyond = self.models[0].beyond(deformation)
+        rows = np.stack([deformation, temperature, kelvins, beyond])
+        found = _forces(self.problem, self.values, self.parts, drifts, rows)
+        spread = np.sqrt(np.maximum(far**2 - near**2, 0.0)).T
+        is_far = np.where(deformation > 0.5 * (low + high), 1.0, -1.0)
+        sign = is_far * np.sign(low + high) * np.where(kelvins < 0.0, -1.0, 1.0)
+        extrapolation = sign[:, None] * np.hypot(spread, found.extrapolation)
+        return found._replace(mean=found.mean + shift.T, extrapolation=extrapolation)
+
+    def _bends(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and sd of the bend of each draw [N], (draw, n) each."""
+        mean, sd = np.empty((2, len(self.model), len(place)))
+        for number, model in enumerate(self.models):
+            mine = self.model == number
+            mean[mine], sd[mine] = model.bend(place, self.bend[mine, 0])
+        return mean, sd
+
+    def _drift(self, name: str) -> np.ndarray:
+        """Return mean and sd of a drift of the rig per kelvin, (draw, 2)."""
+        each = np.array([rig_drifts(model)[name] for model in self.models])
+        return each[self.model]
+
+
+def draws_of(models: Models) -> tuple[Draws, list[str]]:
+    """Return draws of the models that a stream can follow, and notes on all models.
+
+    Raises:
+        NotUsable: a calibration failed its checks.
+        InputError: most of the probability lies on models that cannot be followed.
+    """
+    found, hidden = models_of(models), {}
+    for model in found:
+        for effect in model.effects:
+            if effect.mixture or effect.needs - {"temperature"}:
+                hidden[model.name] = f"a stream does not show its '{effect.name}'"
+    followed = [model for model in found if model.name not in hidden]
+    if sum(model.probability for model in followed) < _LEAST_FOLLOWED:
+        remedy = "Calibrate without it, or diagnose blocks of rows"
+        raise InputError(Finding("known", why, remedy) for why in hidden.values())
+    notes = averaging_words(models)
+    notes += [f"Model '{name}' is left out: {why}." for name, why in hidden.items()]
+    if left := noise_warnings(followed[0].posterior):
+        notes += [*left, "This may cause alarms without a change."]
+    whole = join(followed)
+    case, size, values = whole.posterior.case, whole.size, whole.draws
+    number = np.repeat(np.arange(len(followed)), [len(rows) for rows in whole.rows])
+    prior = followed[0].posterior.priors[MOUNTING]
+    mounting = np.full(size, np.hypot(*moments(prior, MOUNTING)))
+    # The error that a file states for its rows is noise of the stream.
+    stated = np.mean(np.asarray(case.records.force_sd) ** 2)
+    sigma = np.sqrt(values["sigma"] ** 2 + stated)
+    values = {MOUNTING: mounting, **values, "sigma": sigma}
+    scores, parts = np.empty((size, 0)), np.empty((0, 0))
+    if whole.problem.discrepancy is not None:
+        mean, scores, parts = _leftover(whole.problem.discrepancy, values, case)
+        values |= {"gap_weights": mean}
+    score = draw_scores(size, 0)
+    bend = np.stack([score["law"], score["bend"]], axis=1)
+    known = case, whole.problem, tuple(followed), number, values, scores, parts, bend
+    return Draws(*known), notes
+
+
+def _leftover(discrepancy: Discrepancy, values: Values, case: Case):
+    """Return mean weights of the leftover discrepancy, its scores and their parts."""
+    weights = values["gap_weights"]
+    fitted = np.any(weights != 0.0, axis=1)
+    mean = fitted[:, None] * weights[fitted].mean(axis=0)
+    left, size, axes = np.linalg.svd(weights - mean, full_matrices=False)
+    root = np.sqrt(np.count_nonzero(fitted))
+    at = np.asarray(case.records.deformation)
+    parts = axes.T * (size / root)
+    columns = np.asarray(discrepancy.columns(at, np.ones_like(at))) @ parts
+    kept = np.abs(columns).max(axis=0) > _SMALL * np.median(values["sigma"])
+    return mean, left[:, kept] * root, parts[:, kept]
+
+
+@jax.jit
+def _forces(problem: Problem, values: Values, parts, drifts, rows):
+    at, warm, kelvins, beyond = rows
+    records = grid_records(at, warm, jnp.where(at < 0.0, -1.0, 1.0), 0.0)
+    draw = partial(_force, problem, parts, records, kelvins, beyond)
+    return jax.vmap(draw, in_axes=(0, 1), out_axes=1)(values, drifts)
+
+
+def _force(
+    problem: Problem, parts, records, kelvins, beyond, value: Values, drifts
+) -> RowForces:
+    """Return the readings that one draw expects, without an axis of draws."""
+    (zero, zero_sd), (frame, frame_sd) = drifts
+    at = records.deformation
+
+    def reading(factor):
+        shifts = {"factor": factor, "moved": frame * kelvins}
+        mean, noise = force_of(problem, value, records, **shifts)
+        return mean + zero * kelvins, noise
+
+    mean, slope, noise = jax.jvp(reading, (1.0,), (1.0,), has_aux=True)
+    excess = jnp.exp(noise.log_weight) @ noise.sd**2 - value["sigma"] ** 2
+    radial = value["K"] * value["E0"] * problem.unit_stiffness
+    drift = jnp.abs(kelvins) * jnp.hypot(zero_sd, radial * frame_sd)
+    if problem.discrepancy is None:
+        columns = jnp.empty((len(at), 0))
+        return RowForces(mean, slope, excess, drift, columns)
+    weights = value["gap_weights"]
+    # A stream does not show the direction: the loop of the leftover is noise.
+    middle, up = (
+        (1.0 - beyond)[:, None] * problem.discrepancy.columns(at, way + 0.0 * at)
+        for way in (0.0, 1.0)
+    )
+    loop = (up - middle) @ jnp.column_stack([weights, parts])
+    excess = excess + jnp.sum(loop**2, axis=1)
+    columns = jnp.any(weights != 0.0) * (middle @ parts)
+    return RowForces(mean + middle @ weights, slope, excess, drift, columns)
