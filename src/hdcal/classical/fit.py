@@ -5,7 +5,7 @@ independent, normal and of equal size: Draper and Smith, Applied Regression Anal
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, InstanceOf, computed_field
@@ -99,7 +99,7 @@ class Fits(Result):
     interval_kind: str = "confidence interval (t), independent normal errors"
     fits: tuple[Polynomial, ...]
     at_mm: float | None
-    case: Annotated[InstanceOf[Case], Field(exclude=True)]
+    case: InstanceOf[Case] = Field(exclude=True)
 
     @computed_field
     @property
@@ -138,9 +138,8 @@ def fit(
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
     x, y = np.asarray(records.deformation), np.asarray(records.force)
-    scaled = x / np.max(np.abs(x))
     for degree in degrees:
-        rank = np.linalg.matrix_rank(_columns(scaled, degree, True))
+        rank = np.linalg.matrix_rank(_columns(x / np.abs(x).max(), degree, True))
         if rank <= degree or rank == len(x):
             words = f"the deformations do not determine degree {degree}"
             remedy = "Use a lower degree, or measure at more deformations"
