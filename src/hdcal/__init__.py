@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
-    from hdcal.motion.dynamic_posterior import DynamicPosterior
+    from hdcal.motion.dynamic_problem import DynamicPosterior
     from hdcal.motion.respond import respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Case": "data.case",
     "Diagnosis": "diagnosis.result",
-    "DynamicPosterior": "motion.dynamic_posterior",
+    "DynamicPosterior": "motion.dynamic_problem",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "FleetPosterior": "fleets.fleet_posterior",

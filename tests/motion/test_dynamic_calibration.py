@@ -17,9 +17,9 @@ from hdcal.inference.checks import Check
 from hdcal.inference.model_average import load_models
 from hdcal.motion import mode_search
 from hdcal.motion.dynamic_calibration import whiteness_check
-from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.motion.dynamic_problem import (
     FRICTION,
+    DynamicPosterior,
     build_dynamic,
     dynamic_site_priors,
 )

@@ -35,7 +35,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
         console.reserve_folder(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
     from hdcal.inference.model_average import load_models
-    from hdcal.motion.dynamic_posterior import DynamicPosterior
+    from hdcal.motion.dynamic_problem import DynamicPosterior
     from hdcal.motion.respond import respond as compute
 
     if asked["mass"] is not None:

@@ -19,8 +19,8 @@ from hdcal.inference.assembly import (
 )
 from hdcal.inference.checks import Check
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
-from hdcal.motion.dynamic_posterior import DynamicPosterior
 from hdcal.motion.dynamic_problem import (
+    DynamicPosterior,
     DynamicProblem,
     build_dynamic,
     dynamic_site_priors,

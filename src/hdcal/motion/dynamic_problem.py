@@ -1,10 +1,12 @@
-"""Inference problem of a gear in motion: priors, data, density.
+"""Inference problem of a gear in motion, and its posterior.
 
 The force is the input, taken as read and linear between the rows; the deformation is
 the output, read with an offset and white noise.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,7 +25,9 @@ from hdcal.inference.gauges import where_read, with_gains
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import (
+    Problem,
     case_reading,
     influence_prior,
     unit_stiffness,
@@ -207,3 +211,35 @@ def pointwise(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
 def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
     each = pointwise(problem, values)
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
+
+
+class DynamicPosterior(Posterior):
+    """A dynamic calibration: draws in code units, priors, checks and provenance.
+
+    It has no offset of the force and no effect but dry friction: forces are predicted
+    from a calibration at rest.
+    """
+
+    kind: ClassVar[str] = "dynamic"
+
+    @property
+    def sites(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each parameter of a draw."""
+        return dict.fromkeys(self.priors, ())
+
+    @cached_property
+    def effective_priors(self) -> Mapping[str, Prior]:
+        """The priors; none depends on another parameter."""
+        return self.priors
+
+    @cached_property
+    def problem(self) -> Problem:
+        """Raise `InputError`, as there is no model of the force as read."""
+        words = "this is a calibration of the moving gear, without a force offset"
+        remedy = "Take one of the gear at rest, or ask how the gear responds"
+        raise InputError([Finding(self.case.name, words, remedy)])
+
+    @cached_property
+    def moving(self) -> DynamicProblem:
+        """The inference problem that was sampled."""
+        return build_dynamic(self.case, self.priors, self.theory, self.effects)

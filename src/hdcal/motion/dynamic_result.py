@@ -10,8 +10,12 @@ from pydantic import Field, computed_field
 
 from hdcal.exported import jit
 from hdcal.motion.charts import motion_chart
-from hdcal.motion.dynamic_posterior import DynamicPosterior
-from hdcal.motion.dynamic_problem import SITES, DynamicProblem, predict_motion
+from hdcal.motion.dynamic_problem import (
+    SITES,
+    DynamicPosterior,
+    DynamicProblem,
+    predict_motion,
+)
 from hdcal.report.chart_spec import Chart
 from hdcal.report.draws_charts import prior_chart, rank_chart
 from hdcal.report.item import Interval, Words, quantity

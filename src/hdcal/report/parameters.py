@@ -1,11 +1,10 @@
 """Parameters of a posterior, with their intervals, in the units of people."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from hdcal.data.theory_names import SPRING, Theory
+from hdcal.data.theory_names import SPRING
 from hdcal.inference.diagnostics import Convergence, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
@@ -77,14 +76,6 @@ def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
     return {
         name: _estimate(posterior, name, found.get(name)) for name in (*found, *fixed)
     }
-
-
-def measured(
-    parameters: Mapping[str, ParameterEstimate], theory: Theory
-) -> dict[str, ParameterEstimate]:
-    """Return the parameters without those that the theory itself defines."""
-    defined = {"E0"} if theory == SPRING else set()
-    return {name: one for name, one in parameters.items() if name not in defined}
 
 
 def _estimate(

@@ -159,14 +159,6 @@ def percent(share: float | None) -> str:
     return f"{round(100.0 * share)} %"
 
 
-def percent_span(entry: Interval) -> str:
-    """Return a share with its interval."""
-    if not (known(entry.lo) and known(entry.hi)):
-        return percent(entry.median)
-    ends = f"{percent(entry.lo).removesuffix(' %')} … {percent(entry.hi)}"
-    return f"{percent(entry.median)} ({ends})"
-
-
 def load(value: float | None, units: Quantities = FORCE) -> str:
     """Return a force or torque with two digits, or all those before the point."""
     if not known(value):
