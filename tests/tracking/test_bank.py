@@ -8,7 +8,7 @@ from posteriors import single
 from scipy import stats
 from streams import correlated, with_correlation
 
-from hdcal.tracking.bank import STIFFNESS, Bank, _normal_score, _rounding_weight
+from hdcal.tracking.bank import CELLS, STIFFNESS, Bank, _normal_score, _rounding_weight
 from hdcal.tracking.tracker import Reading, Tracker
 
 STEP = 0.98
@@ -115,7 +115,7 @@ def rounded_bank(noise: float) -> Bank:
     bank = Tracker(single())._bank
     rate = bank.shape * (noise**2 + STEP**2 / 12.0) * jnp.ones(128)
     bank = tree_at(lambda bank: bank.rate, bank, rate)
-    bank = tree_at(lambda bank: bank.counts, bank, jnp.zeros(2**15))
+    bank = tree_at(lambda bank: bank.counts, bank, jnp.zeros(CELLS))
     return tree_at(lambda bank: bank.step, bank, jnp.asarray(STEP))
 
 

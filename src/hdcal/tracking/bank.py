@@ -32,7 +32,7 @@ _FARTHEST = 4.0
 _MOST_REPEATED = 0.1
 # Forces in neighbouring cells, so many steps wide, share their error of rounding. They
 # are counted in a table of fixed size, where each epoch has other cells.
-CELL, CELLS, _EPOCH = 0.125, 2**15, 7919
+CELL, CELLS, _EPOCH = 0.125, 2**12, 1531
 # Turn of the unknowns of untested conditions, from this share of the noise on.
 _TURN, _LEAST = 0.37, 0.1
 # What is computed of a row.

@@ -31,9 +31,9 @@ def track(console: Console, known, **settings):
     """Follow a gear reading by reading, from a calibration or diagnosis in RUN.
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
-    "force_N": 37.8}, where known with temperature_C, time_s and run (a label of the
-    mounting); or the first line is a header row such as deformation_mm,force_N, and the
-    others are CSV. Each reading is answered at once by a line on standard output.
+    "force_N": 37.8}, where known with temperature_C and run (a label of the mounting);
+    or the first line is a header row such as deformation_mm,force_N, and the others are
+    CSV. Each reading is answered at once by a line on standard output.
     """
     from hdcal.cli.sources import load_usable
     from hdcal.tracking.stream import answer_lines
