@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from equinox import tree_at
 
-from hdcal.tracking.tracker import Reading, Tracker
+from hdcal.tracking.tracker import StreamReading, Tracker
 
 
 class Followed(NamedTuple):
@@ -33,7 +33,7 @@ def follow(start: Tracker, deformation, force, temperature=None) -> Followed:
     """Follow a stream with a copy of a tracker."""
     warm = np.full(len(force), np.nan) if temperature is None else temperature
     readings = [
-        Reading(deformation=x, force=y, temperature=None if np.isnan(t) else t)
+        StreamReading(deformation=x, force=y, temperature=None if np.isnan(t) else t)
         for x, y, t in zip(
             *map(np.ndarray.tolist, (deformation, force, warm)), strict=True
         )

@@ -9,7 +9,7 @@ from scipy import stats
 from streams import correlated, with_correlation
 
 from hdcal.tracking.bank import CELLS, STIFFNESS, Bank, _normal_score, _rounding_weight
-from hdcal.tracking.tracker import Reading, Tracker
+from hdcal.tracking.tracker import StreamReading, Tracker
 
 STEP = 0.98
 
@@ -67,7 +67,7 @@ def test_rows_that_hardly_differ_keep_their_digits():
     deformation, force = rows(20_000, 0.0, width=1e-6)
     tracker.follow(
         [
-            Reading(deformation=x, force=y)
+            StreamReading(deformation=x, force=y)
             for x, y in zip(deformation.tolist(), force.tolist(), strict=True)
         ]
     )
@@ -82,7 +82,7 @@ def test_rows_that_hardly_differ_keep_their_digits():
 def test_blocks_of_any_size_give_the_same_answers():
     deformation, force = rows(30, 0.3)
     readings = [
-        Reading(deformation=x, force=y)
+        StreamReading(deformation=x, force=y)
         for x, y in zip(deformation.tolist(), force.tolist(), strict=True)
     ]
     together, apart = Tracker(single()), Tracker(single())

@@ -23,7 +23,7 @@ from hdcal.inference.checks import Check
 from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.tracking.draw_forces import draws_of
-from hdcal.tracking.tracker import Reading, Tracker
+from hdcal.tracking.tracker import StreamReading, Tracker
 
 # Ratio of alarms to those that are due. There are fewer in the first hundreds of rows,
 # where a correlation may be larger than it seems.
@@ -153,7 +153,7 @@ def changed(rows: int = 800, *, softer=1.0, jump=0.0, seed=0, label=None, **how)
     tracker, answers = Tracker(single(), **how), []
     for part, run in ((slice(400), "a"), (slice(400, None), label or "a")):
         readings = [
-            Reading(deformation=x, force=y, run=run)
+            StreamReading(deformation=x, force=y, run=run)
             for x, y in zip(at[part].tolist(), force[part].tolist(), strict=True)
         ]
         answers += tracker.follow(readings)

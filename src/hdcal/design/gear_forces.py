@@ -14,13 +14,13 @@ from hdcal.prediction.models import Models, averaging_words
 from hdcal.prediction.simulate import gear_forces
 from hdcal.prediction.sizes import SIZES, matters, stiffness_ratio
 
-__all__ = ["MODULUS", "SIZES", "CalibratedGear", "Models", "matters", "stiffness_ratio"]
+__all__ = ["MODULUS", "SIZES", "GearModel", "Models", "matters", "stiffness_ratio"]
 # Site of a draw: its modulus over that of the tested gear, in another material.
 MODULUS = "_modulus"
 
 
 @dataclass(frozen=True)
-class CalibratedGear:
+class GearModel:
     """Draws of a calibrated gear without the rig: neither zeros nor drift of gauges.
 
     Attributes:
@@ -34,7 +34,7 @@ class CalibratedGear:
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, models: Models, seed: int) -> "CalibratedGear":
+    def of(cls, models: Models, seed: int) -> "GearModel":
         """Return the draws of one or several weighted models.
 
         Raises:

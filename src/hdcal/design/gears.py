@@ -19,7 +19,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.design.gear_forces import (
     MODULUS,
     SIZES,
-    CalibratedGear,
+    GearModel,
     Models,
     stiffness_ratio,
 )
@@ -55,7 +55,7 @@ class Gears:
     facts: dict[str, Prior]
     values: Mapping[str, np.ndarray]
     independent: float
-    model: CalibratedGear | None = None
+    model: GearModel | None = None
     sense: int = 1
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
     deviation: np.ndarray | float = 0.0
@@ -167,7 +167,7 @@ def draw_gears(given: Models | Gear | Gears, seed: int = 0, count: int = 4000) -
     if isinstance(given, Gear):
         gear, theory, model = given, given.theory, None
     else:
-        model = CalibratedGear.of(given, seed)
+        model = GearModel.of(given, seed)
         gear, theory = model.case.gear, model.theory
     if theory == SPRING:
         words = "has no sizes, and a design changes sizes"

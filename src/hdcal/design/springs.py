@@ -23,7 +23,7 @@ _RATES = 61
 _HALVINGS = 4
 
 
-class Gap(NamedTuple):
+class SpringGap(NamedTuple):
     """A window and the gears that have to stay inside.
 
     Attributes:
@@ -58,7 +58,7 @@ class Spring(Kept):
     interference_mm: float = quantity("set point", "mm")
 
 
-def set_points(rate: float, gap: Gap) -> np.ndarray:
+def set_points(rate: float, gap: SpringGap) -> np.ndarray:
     """Return the interval of x in which each gear stays in the window [mm].
 
     Returns:
@@ -88,7 +88,7 @@ def best_common(low: np.ndarray, high: np.ndarray) -> float:
     return float(0.5 * (edges[widest] + edges[widest + 1]))
 
 
-def kept_at(rate: float, x: float, gap: Gap) -> dict[str, float]:
+def kept_at(rate: float, x: float, gap: SpringGap) -> dict[str, float]:
     """Return the probabilities that a set point [mm] achieves at a rate [N/mm]."""
     low, high = set_points(rate, gap)
     above, below = x >= low, x <= high
@@ -97,14 +97,14 @@ def kept_at(rate: float, x: float, gap: Gap) -> dict[str, float]:
     return {name: float(np.clip(np.mean(each), *ends)) for name, each in kept.items()}
 
 
-def judge(rate: float, gap: Gap) -> Spring:
+def judge(rate: float, gap: SpringGap) -> Spring:
     """Return the best common set point at a rate [N/mm]."""
     x = best_common(*set_points(rate, gap))
     return Spring(rate_N_per_mm=rate, interference_mm=x, **kept_at(rate, x, gap))
 
 
 def judge_all(
-    rates: tuple[float, float], gap: Gap, required: float
+    rates: tuple[float, float], gap: SpringGap, required: float
 ) -> tuple[list[Spring], Spring | None]:
     """Return springs between two rates [N/mm], and the softest suitable one or None."""
     springs = [judge(float(rate), gap) for rate in np.geomspace(*rates, _RATES)]

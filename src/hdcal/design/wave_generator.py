@@ -13,7 +13,7 @@ from hdcal.design.gear_forces import Models
 from hdcal.design.gears import Gears, draw_gears
 from hdcal.design.request import Asked, Window, ascending, check_sizes, gears_of
 from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
-from hdcal.design.springs import Gap, Kept, Spring, judge_all, kept_at
+from hdcal.design.springs import Kept, Spring, SpringGap, judge_all, kept_at
 from hdcal.errors import Finding, InputError
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Interval, quantity
@@ -142,7 +142,7 @@ def wave_generator(
     error = np.random.default_rng([seed, 1]).normal(size=gears.size)
     error, least = asked.setting_sd_mm * error, 0.5 / gears.independent
     gap, middle = (
-        Gap(low, high, forces[0], forces[-1], error, least),
+        SpringGap(low, high, forces[0], forces[-1], error, least),
         forces[_ALONG // 2],
     )
     rates = rates or _usual_rates(gap, middle, float(gears.gear.geometry.radius))
@@ -165,7 +165,7 @@ def wave_generator(
     )
 
 
-def _usual_rates(gap: Gap, middle: np.ndarray, radius: float) -> Ends:
+def _usual_rates(gap: SpringGap, middle: np.ndarray, radius: float) -> Ends:
     stiffness = float(np.median(middle)) / (0.5 * (gap.low + gap.high))
     room = max(MOST_TRAVEL * radius - gap.high, gap.high)
     least = float(np.max(gap.force_high)) / room
@@ -173,7 +173,7 @@ def _usual_rates(gap: Gap, middle: np.ndarray, radius: float) -> Ends:
 
 
 def _kept(
-    spring: Spring, gap: Gap, middle: np.ndarray, asked: WindowAsked
+    spring: Spring, gap: SpringGap, middle: np.ndarray, asked: WindowAsked
 ) -> tuple[KeptAt, ...]:
     found = []
     for row, warm in enumerate(asked.temperature_C):

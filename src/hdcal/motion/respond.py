@@ -139,7 +139,7 @@ def respond(
 ) -> Response:
     """Predict the deformation over time under a force on the gear.
 
-    Motion begins at rest, from the unloaded gear.
+    IntegratedMotion begins at rest, from the unloaded gear.
 
     Args:
         models: from `calibrate`, `diagnose` or `calibrate_dynamic`.

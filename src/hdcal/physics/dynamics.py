@@ -154,7 +154,7 @@ def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
     return damping / (2.0 * jnp.sqrt(stiffness * mass))
 
 
-class Motion(NamedTuple):
+class IntegratedMotion(NamedTuple):
     """A motion over time.
 
     Attributes:
@@ -177,7 +177,7 @@ def integrate(
     force: Forcing,
     times: Float[Array, " n"],
     reach: Scalar = jnp.inf,
-) -> Motion:
+) -> IntegratedMotion:
     """Integrate the equation of motion from rest and zero deformation.
 
     Time is counted in radians of the natural frequency and speed in the deformation
@@ -233,7 +233,7 @@ def integrate(
     done &= jnp.all(jnp.isfinite(deformation) & jnp.isfinite(speed))
     gone = found.result == diffrax.RESULTS.event_occurred
     largest = _largest(times, deformation, speed)
-    return Motion(deformation, speed, largest, done, gone)
+    return IntegratedMotion(deformation, speed, largest, done, gone)
 
 
 def _largest(times, deformation, speed) -> Float[Array, ""]:

@@ -51,8 +51,8 @@ class RowForces(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Draws:
-    """Draws of the models of a case.
+class StreamDraws:
+    """StreamDraws of the models of a case.
 
     Attributes:
         case: that was calibrated.
@@ -86,7 +86,7 @@ class Draws:
         rounding = float(self.problem.step) ** 2 / 12.0
         return self.values["sigma"] ** 2 + rounding
 
-    def take(self, rows: np.ndarray) -> "Draws":
+    def take(self, rows: np.ndarray) -> "StreamDraws":
         """Return some of the draws."""
         values = {name: column[rows] for name, column in self.values.items()}
         scores, model, bend = self.scores[rows], self.model[rows], self.bend[rows]
@@ -131,7 +131,7 @@ class Draws:
         return each[self.model]
 
 
-def draws_of(models: Models) -> tuple[Draws, list[str]]:
+def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
     """Return draws of the models that a stream can follow, and notes on all models.
 
     Raises:
@@ -167,7 +167,7 @@ def draws_of(models: Models) -> tuple[Draws, list[str]]:
     score = draw_scores(size, 0)
     bend = np.stack([score["law"], score["bend"]], axis=1)
     known = case, whole.problem, tuple(followed), number, values, scores, parts, bend
-    return Draws(*known), notes
+    return StreamDraws(*known), notes
 
 
 def _leftover(discrepancy: Discrepancy, values: Values, case: Case):

@@ -6,10 +6,10 @@ from scipy.special import digamma
 
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.tracking.bank import CELLS, Bank
-from hdcal.tracking.draw_forces import MOUNTING, Draws
+from hdcal.tracking.draw_forces import MOUNTING, StreamDraws
 
 DRAWS = 128
-# Draws per coefficient that a regression needs, and that a model needs.
+# StreamDraws per coefficient that a regression needs, and that a model needs.
 _PER_COEFFICIENT = 10
 # Largest variance of log σ² within a draw: a conjugate prior ties the width of the
 # coefficients to the noise, and a lucky first reading would say that there is little.
@@ -18,7 +18,9 @@ _MOST_WITHIN = 0.1
 _PAIRS = 30.0
 
 
-def first_bank(every: Draws, threshold: float, reopen: float) -> tuple[Draws, Bank]:
+def first_bank(
+    every: StreamDraws, threshold: float, reopen: float
+) -> tuple[StreamDraws, Bank]:
     """Return some of the draws, and what they know of a stream.
 
     Args:
@@ -66,7 +68,9 @@ def first_bank(every: Draws, threshold: float, reopen: float) -> tuple[Draws, Ba
     return draws, Bank(**arrays, epoch=jnp.zeros((), int))
 
 
-def _coefficients(every: Draws, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _coefficients(
+    every: StreamDraws, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and covariance of the coefficients given the shape of each draw.
 
     By linear regression within each model on the values that shape the curve. The last

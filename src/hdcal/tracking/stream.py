@@ -15,7 +15,7 @@ from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text import text_grid
 from hdcal.errors import InputError
 from hdcal.quantities import Quantities
-from hdcal.tracking.tracker import Reading, Tracker
+from hdcal.tracking.tracker import StreamReading, Tracker
 
 # A longer line is no reading; of the rest of it nothing is kept.
 _LONGEST = 1 << 16
@@ -55,7 +55,9 @@ def _blocks(source: BinaryIO) -> Iterator[list[bytes]]:
     yield [rest] if rest.strip() else []
 
 
-def _attempt(read: Callable[[bytes], Reading], line: bytes) -> Reading | str:
+def _attempt(
+    read: Callable[[bytes], StreamReading], line: bytes
+) -> StreamReading | str:
     """Return the reading of a line, or why it is none."""
     if len(line) > _LONGEST:
         return f"the line is longer than {_LONGEST} bytes"
@@ -68,12 +70,12 @@ def _attempt(read: Callable[[bytes], Reading], line: bytes) -> Reading | str:
         return str(error)
 
 
-def json_reader(units: Quantities) -> Callable[[bytes], Reading]:
+def json_reader(units: Quantities) -> Callable[[bytes], StreamReading]:
     """Return the reader of lines of JSON with keys such as `force_N`."""
     names = {"deformation": units.key("deformation_mm"), "force": units.key("force_N")}
     names |= {"temperature": "temperature_C"}
 
-    class JsonReading(Reading):
+    class JsonReading(StreamReading):
         model_config = ConfigDict(
             extra="ignore", alias_generator=lambda name: names.get(name, name)
         )
@@ -81,7 +83,9 @@ def json_reader(units: Quantities) -> Callable[[bytes], Reading]:
     return JsonReading.model_validate_json
 
 
-def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] | None:
+def csv_reader(
+    header: bytes, units: Quantities
+) -> Callable[[bytes], StreamReading] | None:
     """Return the reader of the lines below a header row; None if it is none."""
     names = *_REQUIRED, *_OTHERS, *(() if units.is_force else ("angle", "torque"))
     try:
@@ -94,7 +98,7 @@ def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] |
         return None
     columns, separator, comma = in_place_of_force(used), grid.separator, False
 
-    def read(line: bytes) -> Reading:
+    def read(line: bytes) -> StreamReading:
         nonlocal comma
         cells = split_line(line.decode().strip("\r\n"), separator)
         if len(cells) != grid.width:
@@ -110,6 +114,6 @@ def csv_reader(header: bytes, units: Quantities) -> Callable[[bytes], Reading] |
             except CellError as error:
                 raise ValueError(f"{quantity}: {error.args[0]}") from None
             found[quantity] = float(column.unit.convert(number)[0])
-        return Reading(**found)
+        return StreamReading(**found)
 
     return read

@@ -30,7 +30,7 @@ def _number(name: str, **more: Any) -> Any:
     return Field(ge=range_of(name).low, le=range_of(name).high, **more)
 
 
-class Reading(BaseModel):
+class StreamReading(BaseModel):
     """A reading of a stream.
 
     Attributes:
@@ -96,7 +96,7 @@ class Tracker:
         self.rows = self.readings = self.alarms = 0
 
     def update(self, deformation: float, force: float, **more) -> dict[str, Any]:
-        """Take one reading; its numbers, and what else it may have, are at `Reading`.
+        """Take one reading; its fields are those of `StreamReading`.
 
         Returns:
             A line of `hdcal track`, as plain data.
@@ -104,9 +104,11 @@ class Tracker:
         Raises:
             ValueError: a number is missing or implausible; nothing was learned.
         """
-        return self.follow([Reading(deformation=deformation, force=force, **more)])[0]
+        return self.follow(
+            [StreamReading(deformation=deformation, force=force, **more)]
+        )[0]
 
-    def follow(self, readings: Sequence[Reading | str]) -> list[dict[str, Any]]:
+    def follow(self, readings: Sequence[StreamReading | str]) -> list[dict[str, Any]]:
         """Take readings in their order, which is faster than one by one.
 
         Args:
@@ -131,7 +133,7 @@ class Tracker:
                 self._fill(answer, line)
         return answers
 
-    def _as_row(self, reading: Reading) -> tuple[float, ...]:
+    def _as_row(self, reading: StreamReading) -> tuple[float, ...]:
         """Return deformation, temperature, force, and flags: follows, remounted."""
         remounted = None is not self._run != reading.run is not None
         self._run = self._run if reading.run is None else reading.run
