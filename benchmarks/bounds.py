@@ -34,6 +34,10 @@ SAMPLED = {"chains": 2, "warmup": 500, "draws": 1500}
 # Of one size, as every other one is compiled anew.
 MEMBERS, ROWS = 5, 12
 CONTENT, CONFIDENCE = 0.9, 0.95
+# Tested and other temperature [°C]; sds of the drift of the zero [N/K] and the frame
+# [mm/K], as the shipped priors have them.
+COLD, WARM = 20.0, 80.0
+DRIFTS = (0.1, 1e-3)
 # An immediate prediction has no part in what time alone brings.
 OF_TIME = ("charge_leakage", "amplifier_drift")
 GEAR = """[gear]
@@ -44,7 +48,7 @@ material = "40CrNiMoA"
 """
 
 
-def ramp(deformation: np.ndarray, temperature: float = 20.0) -> History:
+def ramp(deformation: np.ndarray, temperature: float = COLD) -> History:
     """Return a ramp from rest."""
     count = len(deformation)
     none, one = np.zeros(count, dtype=int), np.ones(count)
@@ -89,7 +93,8 @@ def draw_case(kind: str, rng: np.random.Generator) -> tuple[str, dict] | None:
     for times in TIMES:
         path = np.append(along[along < times * TESTED], times * TESTED)
         mean.append(replace(rig, history=ramp(path)).readings(active)[-1])
-    warm = ramp(np.append(along, TESTED)[-1:], 80.0)
+    warm = replace(rig, history=ramp(np.append(along, TESTED)[-1:], WARM))
+    drift = (WARM - COLD) * rng.normal(0.0, DRIFTS) @ (1.0, rig.stiffness)
     return "\n".join(lines) + "\n", {
         "kind": kind,
         "members": members,
@@ -101,7 +106,7 @@ def draw_case(kind: str, rng: np.random.Generator) -> tuple[str, dict] | None:
         "spread": spread,
         "mean": mean,
         "score": float(rng.normal()),
-        "hot": float(replace(rig, history=warm).readings(active)[-1]),
+        "hot": float(warm.readings(active)[-1] + drift),
     }
 
 
@@ -134,7 +139,7 @@ def answer(folder: Path, name: str) -> None:
             asked |= {"population": truths[rig]["kind"]}
             gap = truths[rig]["with_gap"]
             posterior = hdcal.calibrate(case, with_gap=gap, **SAMPLED)
-            places = [(times * TESTED, 20.0) for times in TIMES] + [(TESTED, 80.0)]
+            places = [(times * TESTED, COLD) for times in TIMES] + [(TESTED, WARM)]
             for at, warm in places:
                 one = hdcal.margin(posterior, at, temperature=warm, **asked).worst
                 mean, member = one.force_N, one.member_N
