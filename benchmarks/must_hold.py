@@ -114,7 +114,7 @@ def _bound(
     """Return whether the upper 99/95 bound of readings holds what it promises."""
     if not posterior.usable:
         return Outcome(None, True, np.nan)
-    found = hdcal.margin(posterior, at, content=CONTENT, sensitivities=False)
+    found = hdcal.margin(posterior, at, content=CONTENT)
     upper = found.worst.upper_bound_N
     return Outcome(share(upper) >= CONTENT, warned(posterior), upper - mean)
 
@@ -160,7 +160,7 @@ def rounded_exceedance(rng, folder: Path, seed: int) -> Outcome:
     truth = float(stats.norm.sf(edge, mean, FINE))
     if not found.usable:
         return Outcome(None, True, np.nan)
-    asked = {"limit_force": capacity, "sensitivities": False}
+    asked = {"limit_force": capacity}
     given = hdcal.margin(found, at, **asked).worst.exceedance
     holds = given.lo <= truth <= given.hi
     return Outcome(holds, warned(found), given.hi - given.lo)

@@ -19,6 +19,7 @@ from hdcal.calibration.calibration import Calibration, calibration_of
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import PLAUSIBLE, Check
 from hdcal.prediction.bands.charts import bands_chart
+from hdcal.prediction.bands.result import COLUMNS
 from hdcal.report.chart_spec import Band, Line, Points
 
 X = np.linspace(0.02, 0.54, 60)
@@ -115,7 +116,7 @@ def test_charts_show_readings_bands_densities_and_ranks():
     (readings,) = (mark for mark in top.marks if isinstance(mark, Points))
     np.testing.assert_array_equal(readings.y, posterior.case.records.force)
     labels = {mark.label for mark in top.marks if isinstance(mark, Band)}
-    assert {"force model", "with the leftover discrepancy"} <= labels
+    assert {"mean force", "with the leftover discrepancy"} <= labels
     (median,) = (m for m in below.marks if isinstance(m, Line) and m.dash == "solid")
     assert np.nanmax(np.abs(median.y)) == 0.0
     residual = [panel.x for panel in charts["residuals"].panels]
@@ -153,12 +154,12 @@ def test_in_tension_the_falling_branch_is_that_of_loading():
 
 def test_each_temperature_has_a_panel_and_untested_parts_are_hatched():
     bands = calibration_of(single()).bands
-    warm = replace(bands, temperature_C=bands.temperature_C + 30.0)
+    warm = bands.model_copy(update={"temperature_C": bands.temperature_C + 30.0})
     both = {
-        name: np.concatenate([column, warm.columns()[name]])
-        for name, column in bands.columns().items()
+        name: np.concatenate([getattr(bands, name), getattr(warm, name)])
+        for name in (*COLUMNS, "straight_N")
     }
-    marks = bands_chart(type(bands)(**both)).panels[0].marks
+    marks = bands_chart(bands.model_copy(update=both)).panels[0].marks
     medians = [m for m in marks if isinstance(m, Line) and m.dash == "solid"]
     assert [m.label[:9] for m in medians] == ["median at"] * 2
     assert medians[0].colour != medians[1].colour

@@ -14,8 +14,8 @@ from hdcal.inference.sample import check_settings
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (["predict", "--deformation", "99"], "--deformation: 99 mm on a radius"),
-        (["margin", "--deformation", "99"], "--deformation: 99 mm on a radius"),
+        (["predict", "--deformation", "99"], "--deformation: 99 mm, where"),
+        (["margin", "--deformation", "99"], "--deformation: 99 mm, where"),
         (["margin", "--deformation", ".4", "--content", "9"], "--content: 9 does"),
         (
             ["margin", "--deformation", ".4", "--tolerance", "size_mm=1"],

@@ -161,7 +161,7 @@ def test_bounds_are_told_of_any_share_with_any_confidence(fleet: Fleet):
     for how, words in (
         ({"content": 0.5}, "content: 0.5 is no more than half"),
         ({"content": 1.0}, "content: 1 does not lie between"),
-        ({"confidence": 0.99}, "400 draws cannot tell a confidence of 0.99"),
+        ({"confidence": 0.99}, "400 draws cannot resolve a confidence"),
     ):
         with pytest.raises(InputError, match=words):
             fleet.next_force(0.4, **how)

@@ -125,7 +125,7 @@ def test_the_factor_is_that_of_the_intervals():
 def test_every_answer_says_so():
     rng = np.random.default_rng(7)
     posterior = regressed(X, 200.0 * X + 0.5 * correlated(0.8, rng), rng, 400)
-    found = hdcal.margin(posterior, 0.4, sensitivities=False)
+    found = hdcal.margin(posterior, 0.4)
     assert any("Neighbouring readings err alike" in said for said in found.remarks)
     answer = calibration_of(posterior)
     assert any("Neighbouring readings err alike" in said for said in answer.warnings)

@@ -108,9 +108,14 @@ def test_rounded_readings_have_half_a_step_more():
     ):
         moved = getattr(other, name) - getattr(one, name)
         assert moved == pytest.approx(sign * half, abs=1e-6)
-    least = hdcal.margin(exact_of(0.0), 0.1, limit_force=24.0 - half).worst
-    expected = least.exceedance.probability
-    assert other.exceedance.probability == pytest.approx(expected, rel=1e-9)
+    # The interval of the share holds wherever the force lies in a step.
+    most, least = (
+        hdcal.margin(exact_of(0.0), 0.1, limit_force=24.0 + by).worst.exceedance
+        for by in (-half, half)
+    )
+    assert other.exceedance.hi == pytest.approx(most.hi, rel=1e-9)
+    assert other.exceedance.lo == pytest.approx(least.lo, rel=1e-9)
+    assert least.probability < other.exceedance.probability < most.probability
     # The rounding is a uniform component of one member.
     sd = np.hypot(plain.combined_standard_uncertainty_N, step / 12.0**0.5)
     assert rounded.combined_standard_uncertainty_N == pytest.approx(sd)

@@ -133,7 +133,7 @@ def test_the_wheel_zooms_both_and_two_clicks_show_all(calibrated, tmp_path):
     # Both ends of a band stand in one row, under the name of the band.
     ends = [row for row in said if "…" in row]
     assert len(ends) >= 2 and not any("2.5 %" in row for row in said)
-    assert re.search(r"force model ?[-\d.]+ … [-\d.]+", " ".join(ends))
+    assert re.search(r"mean force ?[-\d.]+ … [-\d.]+", " ".join(ends))
 
 
 def test_charts_over_another_axis_stay_where_they_are(tmp_path):

@@ -21,10 +21,10 @@ SENSE = {"up": 1.0, "down": -1.0}
 # How far beyond the data still counts as tested: thermometers are no better [K], and
 # a deformation is compared with itself as it was written [mm].
 NEAR_K, NEAR_MM = 1.0, 1e-9
-# A deformation this many times the largest that was read is a slip of the unit; so is a
+# A deformation this many times the largest that was read is a wrong unit; so is a
 # force this many times larger or smaller than the usual.
 OFF = 100.0
-# More than this loss of Young's modulus is a slip of the unit [-].
+# A relative change of Young's modulus this large or larger is a wrong unit [-].
 _MOST_LOSS = 0.5
 
 
@@ -157,7 +157,7 @@ def _within(values, measured, slack: float) -> np.ndarray:
 def far_findings(
     deformation: float, tested: float, reach: float = math.inf, unit: str = "mm"
 ) -> list[Finding]:
-    """Return a finding where a deformation can only be a slip of the unit.
+    """Return a finding where a deformation can only be in a wrong unit.
 
     Args:
         deformation: as given, of either sign [mm].
@@ -211,6 +211,6 @@ def temperature_findings(
         return wrong
     rise = np.max(np.abs(temperature - gear.reference_temperature))
     if np.median(values["alpha"]) * rise >= _MOST_LOSS:
-        words = "the linear law E(T) would lose half of Young's modulus"
+        words = "the linear law E(T) would change Young's modulus by half or more"
         return [Finding(name, words, "Give it in °C")]
     return []

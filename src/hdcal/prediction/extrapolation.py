@@ -29,7 +29,8 @@ NOISES = np.geomspace(0.1, 1.2, 10)
 KNOTS = 48
 # Part of the tested range over which the bend takes the place of a fitted leftover.
 FADE = 0.03
-# Least sd of the noise as a share of the force range: readings may have been computed.
+# Least sd of the noise as a share of the force range: readings may have been computed;
+# and the least such range [N], where they show none.
 LEAST_NOISE, LEAST_RANGE = 1e-6, 1e-9
 
 
@@ -46,7 +47,7 @@ class Bend:
         axes: directions of the residuals that no line absorbs, (k, m).
         found: the residuals along these directions [N], (m,).
         size: of the bend under each law [N], (g,).
-        spread: variance along each direction under each law [N²], (m, g).
+        variance: variance along each direction under each law [N²], (m, g).
         chances: probability of each law, (g,).
     """
 
@@ -57,7 +58,7 @@ class Bend:
     axes: np.ndarray
     found: np.ndarray
     size: np.ndarray
-    spread: np.ndarray
+    variance: np.ndarray
     chances: np.ndarray
 
     def place(self, deformation: np.ndarray) -> np.ndarray:
@@ -86,8 +87,8 @@ class Bend:
         prior = covariance(at, at, pairs=False)
         prior += np.sum(lines * (lines @ among - 2.0 * to_knots), axis=1)
         square = self.size[:, None] ** 2
-        mean = square * ((self.found / self.spread.T) @ cross.T)
-        taken = square * ((1.0 / self.spread.T) @ (cross.T**2))
+        mean = square * ((self.found / self.variance.T) @ cross.T)
+        taken = square * ((1.0 / self.variance.T) @ (cross.T**2))
         return mean, np.sqrt(np.maximum(square * (prior - taken), 0.0))
 
     def of_draws(
@@ -150,12 +151,12 @@ def _fitted(end: float, far: float, deformation, residual, weight, change) -> Be
             change * SIZES, np.maximum(left, LEAST_NOISE * change) * NOISES
         )
     )
-    spread = size**2 * strength[:, None] + noise**2
-    misfit = np.sum(np.log(spread) + found[:, None] ** 2 / spread, axis=0)
+    variance = size**2 * strength[:, None] + noise**2
+    misfit = np.sum(np.log(variance) + found[:, None] ** 2 / variance, axis=0)
     unusual = np.log(np.maximum(size / (ORDINARY * change), 1.0))
     log_chance = -0.5 * (misfit + within / noise**2 + unusual**2)
     log_chance -= (rows - len(knots)) * np.log(noise)
-    return Bend(end, far, knots, line, axes, found, size, spread, softmax(log_chance))
+    return Bend(end, far, knots, line, axes, found, size, variance, softmax(log_chance))
 
 
 def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.ndarray:
@@ -174,7 +175,7 @@ def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.
 
 @jit
 def _residuals(problem: Problem, values: Values, records: Records):
-    """Return what a straight model leaves of each row [N], and its precision."""
+    """Return the residual of each row without the leftover [N], and its precision."""
     mean, noise = predict_rows(problem, values, records, None)
     residual = records.force - mean
     return residual, row_precision(residual, with_rounding(noise, problem.step))

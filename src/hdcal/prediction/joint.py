@@ -96,7 +96,8 @@ class JointModel(Model):
     def independent_draws(self) -> float:
         """Effective number of draws of all models."""
         least = sum(m.probability**2 / m.independent_draws for m in self.models)
-        return min(1.0 / least, self.size)
+        total = sum(model.probability for model in self.models)
+        return min(total**2 / least, self.size)
 
 
 def joint(models: Models, most: int | None = None) -> JointModel:

@@ -164,7 +164,7 @@ def over_draws(values: np.ndarray, weight: np.ndarray, levels) -> np.ndarray:
     """Return weighted quantiles over draws, (level, row).
 
     Args:
-        values: shape (draw, row); infinite ones are allowed.
+        values: finite, shape (draw, row).
         weight: of the draws, (draw,).
         levels: shares of the weight below.
     """

@@ -15,7 +15,7 @@ RAREST = 1e-6
 def share_findings(
     shares: Mapping[str, float], draws: int, more: str = ""
 ) -> list[Finding]:
-    """Return findings for shares that are none, and for those that cannot be resolved.
+    """Return findings for values that are no probabilities or cannot be resolved.
 
     Args:
         shares: by name; `confidence` is a share of the draws.

@@ -1,7 +1,8 @@
 """Forces of future members of a population, simulated from posterior draws.
 
-Every answer about a future force uses `simulate`: bands, margins, designs, studies,
-responses and tracking.
+Every answer about a future force comes from here: bands and margins use `simulate`,
+designs and studies `gear_forces`, responses `gear_leftover`; streams that are tracked
+have the same bends, scores and drifts.
 """
 
 from collections.abc import Sequence
@@ -224,12 +225,13 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
     """
     place = at.deformation
     if at.quantity == "gear":
-        place = place + float(np.mean(model.draws["deformation_offset"]))
+        free = float(np.mean(model.draws["deformation_offset"]))
+        place = place + free
         # The free shape is known, without force: no bend grows between it and the
         # nearer end of the tested range.
         _, above = model.bends
         low, high = above.far, above.end
-        known = np.clip(place, min(low, 0.0), max(high, 0.0))
+        known = np.clip(place, min(low, free), max(high, free))
         place = np.clip(place, low, high) + (place - known)
     mean, sd = model.bend(place, score["law"])
     bend = mean + sd * score["bend"][:, None] * at.loading
@@ -281,9 +283,9 @@ def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
     geometry, theory = posterior.case.gear.geometry, posterior.theory
     centred = force - np.einsum("n,dnr->dr", node_share, force)[:, None]
     together = np.einsum("n,dnr->dr", node_share, centred**2)
-    alone = {
-        name: np.var(size_nodes(geometry, {name: width}, theory)[0])
-        for name, width in at.tolerances.items()
-    }
+    alone = {}
+    for name, width in at.tolerances.items():
+        nodes, share = size_nodes(geometry, {name: width}, theory)
+        alone[name] = share @ (nodes - share @ nodes) ** 2
     total = sum(alone.values())
     return {name: together * part / total for name, part in alone.items()}

@@ -24,7 +24,7 @@ from hdcal.tracking.change_alarm import step_sums
 from hdcal.tracking.draw_forces import RowForces
 
 STIFFNESS, ZERO = 0, 1
-# Nearer to one a correlation could not be told from a zero.
+# A correlation closer to one could not be distinguished from a shift of the zero.
 _MOST_CORRELATION = 0.95
 # Residuals beyond so many sds count as this in the estimate of ρ.
 _FARTHEST = 4.0
@@ -105,7 +105,9 @@ class Bank(eqx.Module):
 
     def widened(self, index: int, variance) -> "Bank":
         """Return the bank after a coefficient may have moved by this variance."""
-        covariance = self.covariance.at[:, index, index].add(variance / self.noise)
+        covariance = self.covariance.at[:, index, index].add(
+            variance * (self.shape - 1.0) / self.rate
+        )
         return replace(self, covariance=covariance)
 
 

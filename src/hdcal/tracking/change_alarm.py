@@ -18,9 +18,9 @@ _NODES = 96
 def run_length(threshold: float, shift: float = 0.0) -> float:
     """Return the mean number of rows until a one-sided CUSUM from zero passes h.
 
-    Solves L(u) = 1 + L(0) Φ(k − u) + ∫₀ʰ L(v) φ(v + k − u) dv by Gauss-Legendre
-    quadrature, which for this smooth kernel is exact to rounding (Page, Biometrika 41,
-    1954).
+    Solves L(u) = 1 + L(0) Φ(k − u) + ∫₀ʰ L(v) φ(v + k − u) dv, with k the allowance
+    less the shift, by Gauss-Legendre quadrature. For this smooth kernel that is exact
+    to rounding (Page, Biometrika 41, 1954).
 
     Args:
         threshold: h [-].
@@ -45,7 +45,7 @@ def threshold_for(rows: float) -> float:
     def excess(h: float) -> float:
         return np.log(run_length(h)) - np.log(2.0 * rows)
 
-    return float(scipy.optimize.root_scalar(excess, bracket=(0.01, 60.0)).root)
+    return float(scipy.optimize.root_scalar(excess, bracket=(0.01, 25.0)).root)
 
 
 def step_sums(sums, innovation, threshold):

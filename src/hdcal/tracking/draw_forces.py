@@ -23,7 +23,7 @@ from hdcal.prediction.joint import join
 from hdcal.prediction.models import Model, Models, averaging_words, models_of
 from hdcal.prediction.simulate import draw_scores, rig_drifts
 
-# Models with more than this probability have to be ones that a stream can follow.
+# At least this much probability must lie on models that a stream can follow.
 _LEAST_FOLLOWED = 0.5
 # Parts of a leftover discrepancy below this share of the noise are left out.
 _SMALL = 0.03
@@ -52,7 +52,7 @@ class RowForces(NamedTuple):
 
 @dataclass(frozen=True)
 class StreamDraws:
-    """StreamDraws of the models of a case.
+    """Draws of the models of a case that a stream can follow.
 
     Attributes:
         case: that was calibrated.
@@ -112,8 +112,9 @@ class StreamDraws:
         rows = np.stack([deformation, temperature, kelvins, beyond])
         found = _forces(self.problem, self.values, self.parts, drifts, rows)
         spread = np.sqrt(np.maximum(far**2 - near**2, 0.0)).T
-        is_far = np.where(deformation > 0.5 * (low + high), 1.0, -1.0)
-        sign = is_far * np.sign(low + high) * np.where(kelvins < 0.0, -1.0, 1.0)
+        side = np.where(deformation > 0.5 * (low + high), 1.0, -1.0)
+        outward = -1.0 if low + high < 0.0 else 1.0
+        sign = side * outward * np.where(kelvins < 0.0, -1.0, 1.0)
         extrapolation = sign[:, None] * np.hypot(spread, found.extrapolation)
         return found._replace(mean=found.mean + shift.T, extrapolation=extrapolation)
 
@@ -217,7 +218,8 @@ def _force(
         (1.0 - beyond)[:, None] * problem.discrepancy.columns(at, way + 0.0 * at)
         for way in (0.0, 1.0)
     )
-    loop = (up - middle) @ jnp.column_stack([weights, parts])
+    fitted = jnp.any(weights != 0.0)
+    loop = (up - middle) @ jnp.column_stack([weights, fitted * parts])
     excess = excess + jnp.sum(loop**2, axis=1)
-    columns = jnp.any(weights != 0.0) * (middle @ parts)
+    columns = fitted * (middle @ parts)
     return RowForces(mean + middle @ weights, slope, excess, drift, columns)

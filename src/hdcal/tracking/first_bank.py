@@ -9,7 +9,7 @@ from hdcal.tracking.bank import CELLS, Bank
 from hdcal.tracking.draw_forces import MOUNTING, StreamDraws
 
 DRAWS = 128
-# StreamDraws per coefficient that a regression needs, and that a model needs.
+# Draws per coefficient that a regression needs, and fewest draws of a model.
 _PER_COEFFICIENT = 10
 # Largest variance of log σ² within a draw: a conjugate prior ties the width of the
 # coefficients to the noise, and a lucky first reading would say that there is little.
@@ -33,7 +33,7 @@ def first_bank(
     rows = rows[np.linspace(0, len(rows) - 1, DRAWS).astype(int)]
     draws, problem = every.take(rows), every.problem
     mean, covariance = _coefficients(every, rows)
-    new = 1.0 + 1.0 / (problem.runs or np.inf), 1.0 + 1.0 / (problem.specimens or 1.0)
+    new = 1.0 + 1.0 / (problem.runs or 1), 1.0 + 1.0 / (problem.specimens or 1)
     covariance[:, 1, 1] += new[0] * draws.values[MOUNTING] ** 2
     covariance[:, 0, 0] += new[1] * draws.values.get("specimen_sd", 0.0) ** 2
     logs, model = np.log(every.variance), every.model

@@ -10,6 +10,7 @@ from scipy.special import stdtrit
 
 from hdcal.data.plausible import implausible, range_of
 from hdcal.errors import Findings
+from hdcal.prediction.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.models import Models
 from hdcal.tracking.bank import CELL, FIELDS, follow_rows
 from hdcal.tracking.change_alarm import threshold_for
@@ -21,8 +22,8 @@ SCHEMA = "hdcal.track/1"
 _BLOCK = 1024
 # Below this effective number of draws their spread is no posterior's.
 _LEAST_DRAWS = 5.0
-# Margins of the tested deformation [mm] and temperature [K].
-_MARGIN = np.array([1e-9, 1.0])
+# How far beyond the data still counts as tested [mm, K].
+_SLACK = np.array([NEAR_MM, NEAR_K])
 
 
 def _number(name: str, **more: Any) -> Any:
@@ -87,8 +88,8 @@ class Tracker:
         self._keys = self.units.key("stiffness_N_per_mm"), self.units.key("force_N")
         self._reference = every.case.gear.reference_temperature
         tested = np.stack([rows.deformation, rows.temperature])
-        self._low = np.min(tested, axis=1) - _MARGIN
-        self._high = np.max(tested, axis=1) + _MARGIN
+        self._low = np.min(tested, axis=1) - _SLACK
+        self._high = np.max(tested, axis=1) + _SLACK
         mean, scale = map(float, self._bank.stiffness_now)
         self.stiffness = mean, scale * float(stdtrit(2.0 * self._bank.shape, 0.975))
         self._alarm_rows, self._since = alarm_rows, 1

@@ -128,7 +128,7 @@ def predict(
 
 
 def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
-    """Return quantiles [N] at every row, the tails first.
+    """Return quantiles [N] as arrays (tail, row).
 
     Of the mean, of the mean without a fitted leftover discrepancy, of a new reading,
     (3, row) each; and the median of the model alone, (row,).
@@ -214,8 +214,8 @@ def _range_words(case: Case) -> str:
 def default_bands(models: Models, interval: float = 0.95) -> Bands:
     """Return the bands of a result folder: the tested range and a tenth beyond.
 
-    One block per tested temperature (three over the range if there are many, one of
-    a room's) and per direction that was tested.
+    One block per tested temperature (three over the range if there are many, the middle
+    one if they differ by less than 3 K) and per direction that was tested.
 
     Args:
         models: a posterior, or several with probabilities, over which bands average.
@@ -243,7 +243,7 @@ def _default_grid(case: Case) -> np.ndarray:
     ends += [] if nominal is None else [nominal]
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
-    # Not beyond an end that is the unloaded gear and no tested deformation.
+    # Not beyond zero, the unloaded gear.
     low, high = low - beyond * float(low != 0.0), high + beyond * float(high != 0.0)
     for left, right in case.excluded:
         low, high = (low, left) if left >= ends[1] else (right, high)

@@ -77,8 +77,9 @@ def divided(
         rest: name of what no input explains.
 
     Returns:
-        By name the variance of the input, its covariance with the output and the part
-        of the variance of the output. The parts sum to that variance.
+        By name the variance of the input, its covariance with what the inputs before
+        it left of the output, and the part of the variance of the output. The parts
+        sum to that variance.
     """
     left, basis = output - output.mean(), np.empty((len(output), 0))
     parts: dict[str, tuple[float, float, float]] = {}
@@ -147,15 +148,17 @@ def _row(name: str, row, total: float, main: Model, direction: int, units) -> Bu
     own, tied, variance = map(float, row)
     label, unit, distribution, site = _INPUTS[name]
     contribution = variance**0.5
-    scatter = unit == "N" and name != "force_offset"
+    in_newtons = unit == "N" and name != "force_offset"
+    # So that standard uncertainty times sensitivity is the contribution.
+    slope = np.sign(direction * tied) * (variance / own) ** 0.5
     by_data = site in _TYPE_A or (site != "" and main.driver(site) == "data")
     return BudgetRow(
         component=label.format(load=units.load),
         type_="A" if by_data else "B",
         distribution=distribution,
-        standard_uncertainty=contribution if scatter else own**0.5,
+        standard_uncertainty=contribution if in_newtons else own**0.5,
         unit=units.unit(unit),
-        sensitivity_N_per_unit=1.0 if scatter else direction * tied / own,
+        sensitivity_N_per_unit=1.0 if in_newtons else float(slope),
         contribution_N=contribution,
         share=variance / total if total > 0.0 else 0.0,
     )

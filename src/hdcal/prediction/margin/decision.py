@@ -13,7 +13,7 @@ class Conformity(Item):
 
     Attributes:
         rule: guarded or simple.
-        limit_N: force up to which no reading exceeds the limit.
+        limit_N: the limit.
         guard_band_N: how far the acceptance limit lies below it.
         acceptance_limit_N: largest estimate that is accepted.
         probability_of_conformity: that one future member keeps the limit; a lower limit

@@ -22,25 +22,26 @@ def exceedance(
     """Return the probability of exceedance.
 
     Args:
-        above: share of the members above the limit in each draw, (draw,).
+        above: share of the members above the limit in each draw, (3, draw): at the
+            least, on average and at the most, by the place of the force in a step.
         weight: of the draws, (draw,).
         found: models of the draws, in this order.
         confidence: of the share that is not exceeded.
     """
-    mean = float(weight @ above)
+    least, usual, most = above
+    mean = float(weight @ usual)
     # Each draw counts for less where draws depend on each other.
     less = np.concatenate(
         [np.full(m.size, (m.size / m.independent_draws) ** 0.5) for m in found]
     )
-    error = float(np.linalg.norm(less * weight * (above - mean)))
+    error = float(np.linalg.norm(less * weight * (usual - mean)))
     independent = 1.0 / sum(m.probability**2 / m.independent_draws for m in found)
     rough = error > _ROUGH * mean
     resolved = not rough and mean >= RAREST
     if rough:
         mean = min(mean + _UNSEEN / independent, 1.0)
-    low, high, sure = over_draws(
-        above[:, None], weight, [TAILS[0], TAILS[2], confidence]
-    )[:, 0]
+    (low,) = over_draws(least[:, None], weight, [TAILS[0]])[:, 0]
+    high, sure = over_draws(most[:, None], weight, [TAILS[2], confidence])[:, 0]
     mean = max(mean, RAREST)
     return Exceedance(
         probability=mean,

@@ -1,11 +1,12 @@
 """Force at each temperature, and the bounds of each model.
 
-A reading lies within half a step of the force: bounds, capacities and the limit are for
-the worst place of the force in a step. The interval of one member has the rounding as a
-component.
+A reading lies within half a step of the force: bounds, capacities and the interval of
+the share above the limit are for the worst place of the force in a step. In the
+interval of one member and its probability of exceedance the rounding is a component.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,7 +45,15 @@ def force_levels(
     )
     above = None
     if asked.limit_force is not None:
-        above = members.above(asked.limit_force - half)
+        # At the least, with the rounding as a component, and at the most.
+        rounded = replace(members, sd=np.hypot(members.sd, step / 12.0**0.5))
+        above = np.stack(
+            [
+                members.above(asked.limit_force + half),
+                rounded.above(asked.limit_force),
+                members.above(asked.limit_force - half),
+            ]
+        )
     return tuple(
         Level(
             temperature_C=float(warm),
@@ -57,7 +66,7 @@ def force_levels(
             capacity_median_N=float(least[row]),
             exceedance=None
             if above is None
-            else exceedance(above[:, row], weight, found, asked.confidence),
+            else exceedance(above[:, :, row], weight, found, asked.confidence),
         )
         for row, warm in enumerate(asked.temperature)
     )

@@ -79,7 +79,8 @@ def margin(
         required_probability: that a capacity is to hold; the content by default.
         population: whose force; by default the widest that the data support.
         quantity: `reading` of the rig's gauge, or `load` on the gear.
-        direction: up to load, away from the unloaded gear; down to unload.
+        direction: up to load, away from the unloaded gear; down to unload. In tension
+            this is the opposite of `predict`, where up is a rising deformation.
         tolerances: ± by wall_thickness_mm, radius_mm, length_mm, load_height_mm.
         seed: of what the draws leave open.
         rule: of the decision about the limit, guarded (by default) or simple.
