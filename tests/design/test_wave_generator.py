@@ -12,7 +12,7 @@ from schema_checks import obeys
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from hdcal.design.springs import Gap, best_common, judge, set_points
+from hdcal.design.springs import SpringGap, best_common, judge, set_points
 from hdcal.design.wave_generator import WaveGenerator, wave_generator
 from hdcal.errors import InputError
 from hdcal.report.chart_spec import Band, Span
@@ -20,10 +20,10 @@ from hdcal.report.chart_spec import Band, Span
 WINDOW = (0.38, 0.42)
 
 
-def straight(stiffness) -> Gap:
+def straight(stiffness) -> SpringGap:
     """Return straight gears that have to stay in the window."""
     ends = (end * stiffness[None] for end in WINDOW)
-    return Gap(*WINDOW, *ends, np.zeros(len(stiffness)))
+    return SpringGap(*WINDOW, *ends, np.zeros(len(stiffness)))
 
 
 def test_counting_intervals_is_solving_the_balance():
@@ -31,7 +31,7 @@ def test_counting_intervals_is_solving_the_balance():
     factor, levels = gears.factor({}).reshape(-1, 1), np.array([-20.0, 80.0])
     ends = (gears.forces(np.full(2, end), levels, factor) for end in WINDOW)
     rate, x = 500.0, 0.56
-    low, high = set_points(rate, Gap(*WINDOW, *ends, np.zeros(10)))
+    low, high = set_points(rate, SpringGap(*WINDOW, *ends, np.zeros(10)))
     for draw in range(10):
 
         def left(at, level, draw=draw):

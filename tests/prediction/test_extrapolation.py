@@ -42,7 +42,7 @@ def test_the_bend_is_that_of_a_dense_process(side: int):
         size = bend.size[law]
         # Laws of one noise stand side by side: they differ by their size alone.
         first = len(SIZES) * (law // len(SIZES))
-        sizes, spread = bend.size[first : first + 2] ** 2, bend.spread[0, first:]
+        sizes, spread = bend.size[first : first + 2] ** 2, bend.variance[0, first:]
         strength = (spread[1] - spread[0]) / (sizes[1] - sizes[0])
         noise = np.sqrt(spread[0] - strength * sizes[0])
         square, free = size**2, 1e5 * size**2
