@@ -152,7 +152,7 @@ def test_the_softest_spring_fits_inside_the_gear(window):
         ({"setting_sd": -1.0}, "-1 mm does not lie between 0 and 1000"),
         ({"rates": (5.0, 2.0)}, "5:2 is empty"),
         ({"temperatures": [-300.0]}, "absolute zero"),
-        ({"temperatures": [2900.0]}, "Young's modulus by half"),
+        ({"temperatures": [2900.0]}, "half of Young's modulus"),
         ({"tolerances": {"wall": 0.1}}, "unknown choice 'wall'"),
         ({"source": bent(1000, -2.0)}, "does not grow with deformation"),
     ],
