@@ -50,9 +50,10 @@ def test_every_answer_is_mirrored(here: Hdcal, runs: dict[str, Path], tmp_path: 
     for limit, enough in (("70", False), ("±70", False), ("120", True), ("±120", True)):
         pair = both("margin", at, f"--limit-force={limit}", "--given-force=±80")
         for found in pair:
-            assert ("NOT enough" in found["headline"]) != enough
+            assert ("is not enough" in found["headline"]) != enough
             risk = found["worst"]["exceedance"]["probability"]
-            assert risk < 1e-3 if enough else risk > 0.999
+            # Not resolved below three over the effective number of draws.
+            assert risk < 2e-3 if enough else risk > 0.999
         pressed, pulled = (found["worst"] for found in pair)
         assert pulled["capacity_N"] == pytest.approx(pressed["capacity_N"], **NEAR)
         assert pulled["lower_bound_N"] == pytest.approx(

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from hdcal.errors import InputError
 from hdcal.inference.members import MEMBERS
@@ -18,11 +19,11 @@ from hdcal.prediction.simulate import gear_leftover
 __all__ = ["CalibratedGears", "Models", "leftover_force"]
 # Members of what was tested, which may be many and are no part of a gear in motion.
 _LEFT_OUT = {*MEMBERS.values()}
-# The leftover of a draw at so many places, up to this multiple of the tested range
-# beyond the free shape; between places it is interpolated.
-_PLACES, _REACH = 241, 3.0
-# Sites of a draw: places [mm] and the leftover there [N].
-_AT, _LEFTOVER = "_leftover_at", "_leftover"
+# The leftover of a draw at so many places, up to this multiple of the largest tested
+# deformation either way. A cubic spline between them keeps the integration smooth.
+_PLACES, _REACH = 121, 3.0
+# Sites of a draw: the ends of the spline [mm], and its coefficients, highest first.
+_ENDS, _LEFTOVER = "_leftover_ends", "_leftover"
 
 
 class CalibratedGears:
@@ -83,8 +84,9 @@ class CalibratedGears:
             return values
         far = _REACH * float(np.max(np.abs(self.posterior.case.records.deformation)))
         places = np.linspace(-far, far, _PLACES)
-        left = gear_leftover(few, places, seed=seed)
-        return values | {_AT: np.tile(places, (few.size, 1)), _LEFTOVER: left}
+        spline = CubicSpline(places, gear_leftover(few, places, seed=seed), axis=1)
+        ends = np.tile(places[[0, -1]], (few.size, 1))
+        return values | {_ENDS: ends, _LEFTOVER: np.moveaxis(spline.c, 2, 0)}
 
 
 def leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
@@ -101,7 +103,11 @@ def leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
         return None
 
     def leftover(deformation: Scalar) -> Scalar:
-        return jnp.interp(deformation, value[_AT], value[_LEFTOVER])
+        low, high = value[_ENDS]
+        width = (high - low) / (_PLACES - 1)
+        place = jnp.clip(deformation, low, high) - low
+        part = jnp.clip(jnp.floor(place / width), 0, _PLACES - 2).astype(int)
+        return jnp.polyval(value[_LEFTOVER][:, part], place - part * width)
 
     unloaded = leftover(0.0)
     return lambda deformation: leftover(deformation) - unloaded
