@@ -111,3 +111,18 @@ def test_probabilities_of_models_are_averaged():
         for _, p in pair
     ]
     assert both.probability == pytest.approx(0.75 * each[0] + 0.25 * each[1])
+
+
+def test_a_limit_that_is_surely_exceeded_is_not_kept():
+    found = hdcal.margin(single(), 0.4, limit_force=20.0)
+    assert found.decision.statement == "does not conform"
+    assert found.decision.probability_of_conformity == pytest.approx(0.0, abs=1e-12)
+    assert 0.0 <= found.decision.probability_of_conformity
+
+
+def test_a_load_that_no_draw_exceeds_is_not_resolved():
+    """A load has no scatter within a draw: nothing lies above a far limit."""
+    posterior = single()
+    risk = hdcal.margin(posterior, 0.4, quantity="load", limit_force=200.0).worst
+    assert not risk.exceedance.resolved
+    assert risk.exceedance.probability >= 3.0 / len(posterior.draws["K"])

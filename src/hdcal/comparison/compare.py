@@ -113,7 +113,10 @@ def compare(
 
 def _compared(named, draws, first, tolerance: float | None) -> Compared:
     (name, models), apart = named, draws - first
-    effects = {label(e.name) for one in models for e in one.posterior.effects}
+    # Those of the noise do not change the stiffness.
+    effects = {
+        label(e.name) for one in models for e in one.effects if e.stage != "noise"
+    }
     case = models[0].posterior.case
     beyond = None if tolerance is None else float(np.mean(np.abs(apart) > tolerance))
     return Compared(

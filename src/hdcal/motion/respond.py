@@ -328,7 +328,7 @@ def _response(
         estimates=estimates,
         tested_share=motion.tested.mean(),
         effects=tuple(effect.name for effect in kept),
-        left_out=tuple(effect.name for effect in left),
+        left_out=tuple(e.name for e in left if e.stage != "noise"),
         draws=count,
         points=len(motion),
         motion=motion,

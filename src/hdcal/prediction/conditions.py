@@ -192,7 +192,7 @@ def excluded_findings(case: Case, deformation: float, sense: float) -> list[Find
         f"{deformation:g} {unit} is outside the part of the curve that was calibrated, "
         f"{tested.min():.4g} to {tested.max():.4g} {unit}; readings there were left out"
     )
-    remedy = "See the notes of the calibration; `range` chooses another part"
+    remedy = "Calibrate with the range all to include them, or ask inside this part"
     return [Finding("deformation", words, remedy)]
 
 

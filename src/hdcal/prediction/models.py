@@ -83,6 +83,11 @@ class Model:
         """Effects in the model."""
         return self.posterior.effects
 
+    @property
+    def noise_effects(self) -> set[str]:
+        """Names of the effects that describe the noise."""
+        return {effect.name for effect in self.effects if effect.stage == "noise"}
+
     def bend(self, place: np.ndarray, level: np.ndarray):
         """Return mean and sd of the bend of each draw [N], (draw, row) each.
 

@@ -151,7 +151,10 @@ def _row(name: str, row, total: float, main: Model, direction: int, units) -> Bu
     in_newtons = unit == "N" and name != "force_offset"
     # So that standard uncertainty times sensitivity is the contribution.
     slope = np.sign(direction * tied) * (variance / own) ** 0.5
-    by_data = site in _TYPE_A or (site != "" and main.driver(site) == "data")
+    sites = [site] if site else []
+    if name == "noise":
+        sites += [n for n in main.draws if n.partition(".")[0] in main.noise_effects]
+    by_data = site in _TYPE_A or any(main.driver(each) == "data" for each in sites)
     return BudgetRow(
         component=label.format(load=units.load),
         type_="A" if by_data else "B",

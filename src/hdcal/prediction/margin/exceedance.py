@@ -36,13 +36,14 @@ def exceedance(
     )
     error = float(np.linalg.norm(less * weight * (usual - mean)))
     independent = 1.0 / sum(m.probability**2 / m.independent_draws for m in found)
-    rough = error > _ROUGH * mean
+    # Without scatter no draw may lie above the limit: that is no probability of zero.
+    rough = error > _ROUGH * mean or mean == 0.0
     resolved = not rough and mean >= RAREST
     if rough:
         mean = min(mean + _UNSEEN / independent, 1.0)
     (low,) = over_draws(least[:, None], weight, [TAILS[0]])[:, 0]
     high, sure = over_draws(most[:, None], weight, [TAILS[2], confidence])[:, 0]
-    mean = max(mean, RAREST)
+    mean = min(max(mean, RAREST), 1.0)
     return Exceedance(
         probability=mean,
         error=error,

@@ -203,7 +203,8 @@ class Margin(Result):
     @property
     def member(self) -> str:
         """Word for one member of the population."""
-        return _MEMBER[self.population]
+        is_load = self.quantity == "load" and self.population != "specimens"
+        return "load" if is_load else _MEMBER[self.population]
 
     @property
     def members(self) -> str:
