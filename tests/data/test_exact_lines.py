@@ -46,7 +46,7 @@ def test_a_display_that_shows_a_line_is_answered_by_its_step():
     # 0.29 N over these strokes: sd 0.32 N/mm were it the only one.
     assert low < 100 < high
     assert 0.5 < high - low < 4
-    assert diagnose(case, quick=True).which.named == ()
+    assert diagnose(case, quick=True).which.effect is None
 
 
 def test_the_step_is_the_stated_one_or_the_least_between_forces():
