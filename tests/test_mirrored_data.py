@@ -54,6 +54,8 @@ def test_every_answer_is_mirrored(here: Hdcal, runs: dict[str, Path], tmp_path: 
             risk = found["worst"]["exceedance"]["probability"]
             # Not resolved below three over the effective number of draws.
             assert risk < 0.02 if enough else risk > 0.98
+            sure = found["worst"]["exceedance"]["at_confidence"]
+            assert sure < 1e-3 if enough else sure > 0.999
         pressed, pulled = (found["worst"] for found in pair)
         assert pulled["capacity_N"] == pytest.approx(pressed["capacity_N"], **NEAR)
         assert pulled["lower_bound_N"] == pytest.approx(

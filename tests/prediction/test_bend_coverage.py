@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from benchmarks.blind.rig.mechanisms import MECHANISMS
+from benchmarks.bounds import OF_TIME
 from posteriors import regressed
-from pulled_further import OF_TIME, TIMES, all_pulled_further
+from pulled_further import TIMES, all_pulled_further
 from scipy import stats
 
 import hdcal

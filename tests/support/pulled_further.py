@@ -4,15 +4,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from benchmarks.blind.rig.history import FULL, History
+from benchmarks.blind.rig.history import FULL
 from benchmarks.blind.rig.mechanisms import MECHANISMS
 from benchmarks.blind.rig.virtual_rig import draw_rig
+from benchmarks.bounds import ramp
 
 # Largest tested deformation [mm]; where the truth is known, in multiples of it.
 TESTED = FULL / 2.0
 TIMES = (0.5, 0.9, 1.0, 1.0001, 1.02, 1.1, 1.2, 1.5, 2.0)
-# A prediction is an immediate reading: it has no part in what time alone brings.
-OF_TIME = ("charge_leakage", "amplifier_drift")
 
 
 @dataclass(frozen=True)
@@ -32,23 +31,6 @@ class PulledFurther:
     truth: np.ndarray
 
 
-def _ramp(deformation: np.ndarray) -> History:
-    count = len(deformation)
-    none, one = np.zeros(count, dtype=int), np.ones(count)
-    return History(
-        deformation=deformation,
-        temperature=20.0 * one,
-        time=2.0 * np.arange(count),
-        angle=np.linspace(0.0, 2.0 * np.pi, count),
-        direction=one,
-        sense=one,
-        cycle=none,
-        run=none,
-        specimen=none,
-        force=0.0 * one,
-    )
-
-
 def pulled_further(
     name: str, r: float, rng: np.random.Generator, rows: int = 30
 ) -> PulledFurther | None:
@@ -65,7 +47,7 @@ def pulled_further(
     """
     measured, at = np.linspace(0.02, TESTED, rows), TESTED * np.array(TIMES)
     path = np.union1d(measured, at)
-    rig = draw_rig(_ramp(path), rng)
+    rig = draw_rig(ramp(path), rng)
     tested = np.isin(path, measured)
     active = rig.draw_mechanism(MECHANISMS[name], r, rng, tested)
     if active is None:

@@ -33,7 +33,7 @@ from hdcal.physics.dynamics import (
 )
 from hdcal.physics.effect import parameters
 from hdcal.report.chart_spec import Chart
-from hdcal.report.item import INTERVAL, Count, Interval, Item, Words, quantity
+from hdcal.report.item import INTERVAL, TAILS, Count, Interval, Item, Words, quantity
 from hdcal.report.provenance import gear_rows
 from hdcal.report.result import Result
 
@@ -43,7 +43,6 @@ _MOST_SWINGS = 20_000
 # Draws that are integrated together, and the largest number of their states;
 # and points whose quantiles are computed together.
 _CHUNK, _MOST_STATES, _POINTS = 250, 1_000_000, 10_000
-_TAILS = (1.0 - INTERVAL) / 2.0, 0.5, (1.0 + INTERVAL) / 2.0
 _COLUMNS = tuple(f"deformation_{end}_mm" for end in ("lo", "median", "hi"))
 _BAND = (
     "equal-tailed pointwise credible band of the deformation of gears like the tested "
@@ -179,7 +178,7 @@ def respond(
     deformation, peak = _integrate_all(gears, drive, at, (values, m, c))
     # Quantiles are computed of a copy: part by part it takes little memory.
     parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
-    band = np.concatenate([np.quantile(p, _TAILS, axis=0) for p in parts], axis=1)
+    band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
     estimates = _estimates(gears, given, m, c, k, peak)
     return _response(gears, drive, at, band, estimates, len(m))
 
