@@ -88,10 +88,10 @@ def test_gears_that_are_left_out_have_no_part_in_it():
     sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
     read = read_fleet(still, sizes)
     assert read.case.gear.full_scale.force > 3900.0
-    left, alone = usable(read, skip_bad=True)[0], read_fleet(others, sizes)
+    left, alone = usable(read, skip_bad=True), read_fleet(others, sizes)
     assert left.case.gear == alone.case.gear
     whole = read_fleet(frame, sizes)
-    assert usable(whole)[0].case.gear == whole.case.gear
+    assert usable(whole).case.gear == whole.case.gear
 
 
 def test_a_zero_that_nobody_states_may_be_anywhere():

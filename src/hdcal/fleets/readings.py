@@ -1,105 +1,105 @@
-"""From readings to what each mounting says: seven sums, whatever the number of rows."""
+"""Readings of many gears, as sums over each mounting."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+import jax
 import numpy as np
 
 from hdcal.data.case import Case, Gear
+from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
+from hdcal.data.scatter import reading_step
 from hdcal.errors import Finding, InputError, quoted
-from hdcal.evidence.row_features import take_rows
-from hdcal.fleets.gear_sums import MountingSums, stretched
-from hdcal.fleets.groupings import group_offsets
-from hdcal.fleets.groups import group_of, read_by
+from hdcal.fleets.mounting_sums import MountingSums, RowSums, reading_vectors
 from hdcal.inference import distributions
 
 
 @dataclass(frozen=True)
 class FleetReadings:
-    """What was measured on a fleet.
+    """Readings of a fleet.
 
     Attributes:
-        case: its gears, runs and notes; the records are all readings, or those of the
-            first gears where there are very many.
-        sums: of each gear in each mounting.
-        runs: index of each mounting's run, shape (m,).
-        reach: largest deformation of each mounting, its size, shape (m,) [mm as read].
-        sizes: of each gear, by column, where a gear file of its own states them.
+        case: gears, runs and notes; its records are all readings, or the first ones
+            where there are very many.
+        sums: of each mounting. Gears that were pulled are mirrored: their deformation,
+            sense and force have the opposite sign.
+        side: −1 where they were pulled and mirrored, else 1.
+        size_ratio: stiffness of the sizes of each gear over that of the sizes in the
+            gear file, by which x was multiplied, shape (g,); None where all gears have
+            the sizes of the gear file.
+        sizes: sizes of each gear by column, if it has its own gear file.
+        faults: gears with a fault, each with what it is; some are among the readings.
+        checked: whether no gear with a fault is left.
     """
 
     case: Case
     sums: MountingSums
-    runs: np.ndarray
-    reach: np.ndarray
+    side: int = 1
+    size_ratio: np.ndarray | None = None
     sizes: Mapping[str, Sequence] | None = None
+    faults: Mapping[str, Finding] = field(default_factory=dict)
+    checked: bool = False
 
     @property
     def largest(self) -> float:
-        """Largest deformation, with the sign of its mounting's mean [mm as read]."""
-        farthest = int(np.argmax(self.reach))
-        return float(np.copysign(self.reach[farthest], self.sums.x[farthest]))
+        """Largest deformation as read, with its sign [mm]."""
+        farthest = int(np.argmax(self.sums.reach))
+        sign = self.side * np.sign(self.sums.mean[farthest, 0])
+        return float(np.copysign(self.sums.reach[farthest], sign))
+
+    @property
+    def step(self) -> float:
+        """Step of the force display [N]."""
+        return reading_step(self.case)
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
-        """Return the sums as if all gears had the gear file's sizes.
+        """Return sums in which every gear has the sizes of the gear file.
 
         Args:
-            ratio: stiffness of each gear's sizes over that of these, by which its
-                deformations count; shape (g,).
+            ratio: stiffness of the sizes of each gear over that of these, by which its
+                deformations are multiplied, shape (g,).
         """
-        return replace(self, sums=stretched(self.sums, ratio[self.sums.gear]))
-
-    def on_one_rig(self, draws: Mapping[str, np.ndarray]) -> "FleetReadings":
-        """Return sums and records as if a rig of the mean gain had read them all.
-
-        Args:
-            draws: of the population by site, shape (t,).
-        """
-        gain = 1.0 + np.median(np.asarray(group_offsets(draws, "rig")), axis=1)
-        case, sums = self.case, stretched(self.sums, gain[self.sums.rig])
-        records = case.records
-        rig = group_of(case.rigs, np.asarray(records.run))
-        records = replace(records, deformation=gain[rig] * records.deformation)
-        return replace(self, case=replace(case, records=records), sums=sums)
+        sums = self.sums.stretched(ratio[self.sums.gear])
+        return replace(self, sums=sums, size_ratio=ratio)
 
     def since(self, day: str) -> "FleetReadings":
-        """Return what was read on a day or later; mountings without a date are not.
+        """Return what was read on a day or later, of mountings with a date.
 
         Args:
             day: as 2026-09-01.
 
         Raises:
-            InputError: it is no day, no dates are told, or nothing was read then.
+            InputError: it is no day, the data have no dates, or nothing was read then.
         """
-        of_mounting = _read_since(self.case, day)[self.runs]
-        if not of_mounting.any():
+        kept = _read_since(self.case, day)[self.sums.run]
+        if not kept.any():
             words = f"nothing was read on {quoted(day)} or later"
-            words = words if self.case.dates else "no dates are told"
+            words = words if self.case.dates else "the data have no dates"
             raise InputError([Finding("since", words, "See the dates of the data")])
-        found = self._of(of_mounting)
+        found = self._where(kept)
         notes = (*self.case.notes, f"What was read before {day} is left out.")
         return replace(found, case=replace(found.case, notes=notes))
 
     def without(self, bad: Mapping[str, Finding]) -> "FleetReadings":
-        """Return what was read on other gears.
+        """Return the readings of other gears.
 
         Args:
-            bad: gears that are left out, each with what is wrong with it.
+            bad: gears that are left out, each with its fault.
         """
         gone = among(self.case.specimen_labels, bad)
-        found = self._of(~gone[self.sums.gear]) if gone.any() else self
-        left_out = self.case.left_out | dict(bad)
+        found = self._where(~gone[self.sums.gear]) if gone.any() else self
+        left_out = {**self.case.left_out, **bad}
         return replace(found, case=replace(found.case, left_out=left_out))
 
-    def _of(self, of_mounting: np.ndarray) -> "FleetReadings":
-        """Return what was read in some of the mountings, a mask of shape (m,)."""
-        case, sums = self.case, self.sums
-        gears, gear = np.unique(sums.gear[of_mounting], return_inverse=True)
-        runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
-        columns = {name: value[of_mounting] for name, value in vars(sums).items()}
+    def _where(self, kept: np.ndarray) -> "FleetReadings":
+        """Return the readings of some mountings, a mask of shape (m,)."""
+        case, sums = self.case, self.sums.where(kept)
+        gears, gear = np.unique(sums.gear, return_inverse=True)
+        runs, run = np.unique(sums.run, return_inverse=True)
         records = case.records
         rows = np.isin(records.run, runs) & np.isin(records.specimen, gears)
-        records = take_rows(records, np.flatnonzero(rows))
+        records = jax.tree.map(lambda column: np.asarray(column)[rows], records)
         records = replace(
             records,
             specimen=np.searchsorted(gears, records.specimen),
@@ -115,10 +115,9 @@ class FleetReadings:
             rigs=_some(case.rigs, runs),
             dates=_some(case.dates, runs),
         )
-        # Groups are told apart anew: some may be gone.
-        sums = MountingSums(**columns | {"gear": gear} | read_by(case, run))
-        reach = self.reach[of_mounting]
-        return replace(self, case=case, sums=sums, runs=run, reach=reach)
+        ratio = None if self.size_ratio is None else self.size_ratio[gears]
+        sums = replace(sums, gear=gear, run=run)
+        return replace(self, case=case, sums=sums, size_ratio=ratio)
 
 
 def _read_since(case: Case, day: str) -> np.ndarray:
@@ -139,48 +138,37 @@ def _some(labels: tuple[str, ...], places: np.ndarray) -> tuple[str, ...]:
 
 
 def fleet_readings(case: Case) -> FleetReadings:
-    """Return what the readings of a case come to."""
-    records, gear = case.records, case.gear
+    """Return the readings of a case."""
+    records = case.records
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
-    (of_gear, runs), of_row = np.unique(labels, axis=1, return_inverse=True)
-    read, y = np.asarray(records.deformation), np.asarray(records.force)
-    x = read * modulus_left(gear, np.asarray(records.temperature))
-    each = row_sums(of_row.ravel(), x, y)
-    sums = MountingSums(of_gear, *each, **read_by(case, runs))
-    return FleetReadings(case, sums, runs, largest_of(of_row.ravel(), np.abs(read)))
+    (gear, run), index = np.unique(labels, axis=1, return_inverse=True)
+    read, force = np.asarray(records.deformation), np.asarray(records.force)
+    x = read * modulus_left(case.gear, np.asarray(records.temperature))
+    v = reading_vectors(x, np.asarray(records.sense), force)
+    sums = RowSums.of(index.ravel(), v, read)
+    return readings_of(case, gear, run, sums)
 
 
-def largest_of(of_row: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the largest of the values of each mounting, none of which is negative.
+def readings_of(
+    case: Case, gear: np.ndarray, run: np.ndarray, sums: RowSums
+) -> FleetReadings:
+    """Return the readings of a case from the sums of its mountings.
 
     Args:
-        of_row: index of its mounting, shape (n,).
-        values: shape (n,).
+        case: gears and runs.
+        gear: index of the gear of each mounting, ascending, shape (m,).
+        run: index of its run, shape (m,).
+        sums: of its rows.
     """
-    found = np.zeros(1 + int(of_row.max()))
-    np.maximum.at(found, of_row, values)
-    return found
+    side = loading_side(np.array([sums.low.min(), sums.high.max()])) or 1
+    reach = np.maximum(np.abs(sums.low), np.abs(sums.high))
+    # All components of v are odd in the deformation.
+    mean, products, lagged = side * sums.mean, sums.products, sums.lagged
+    each = MountingSums(gear, run, sums.rows, mean, products, lagged, reach)
+    return FleetReadings(case, each, side)
 
 
 def modulus_left(gear: Gear, temperature):
     """Return the modulus at temperatures [°C] over that at the reference."""
     loss, _ = distributions.moments(gear.priors["alpha"])
     return 1.0 - loss * (temperature - gear.reference_temperature)
-
-
-def row_sums(
-    of_row: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return number, means and sums about them of the readings of each mounting.
-
-    Args:
-        of_row: index of its mounting, shape (n,).
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-    """
-    rows = np.bincount(of_row).astype(float)
-    mean_x, mean_y = (np.bincount(of_row, v) / rows for v in (x, y))
-    about_x, about_y = x - mean_x[of_row], y - mean_y[of_row]
-    products = (about_x**2, about_x * about_y, about_y**2)
-    xx, xy, yy = (np.bincount(of_row, each) for each in products)
-    return rows, mean_x, mean_y, xx, xy, yy

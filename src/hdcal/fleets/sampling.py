@@ -1,78 +1,70 @@
-"""Draws of the population: by importance sampling, or by NUTS where these fail."""
+"""Draws of a population: by importance sampling, or by NUTS where that fails."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdcal.data.prior import Prior
-from hdcal.fleets.population_problem import PopulationProblem
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, mixing_checks, sampling_checks
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.importance import MAX_SHAPE, sample_by_importance
 from hdcal.inference.sample import Progress, sample
+from hdcal.inference.sampled_problem import Sampled
 
 
-class SampledPopulation(NamedTuple):
-    """Draws by site, and what is said of them.
+@dataclass(frozen=True)
+class Sampling:
+    """Settings of the samplers.
 
     Attributes:
-        values: of each site, of all chains, shape (d,).
-        checks: of the sampler.
-        sampler: its name.
-    """
-
-    values: dict[str, np.ndarray]
-    checks: tuple[Check, ...]
-    sampler: str
-
-
-def sample_population(
-    problem: PopulationProblem,
-    start: Mapping[str, float],
-    seed: int,
-    *,
-    chains: int,
-    warmup: int,
-    draws: int,
-    progress: Progress | None,
-) -> SampledPopulation:
-    """Return draws of the population.
-
-    Args:
-        problem: the gears.
-        start: sites whose value is roughly known, where to look first.
-        seed: the same one gives the same draws.
-        chains: chains of draws.
+        chains: independent chains, two or more.
         warmup: iterations of adaptation per chain, where NUTS draws.
-        draws: of each chain.
+        draws: kept per chain.
+        seed: of all random numbers.
         progress: called with (steps done, steps in all).
     """
-    whitening = laplace.fit(problem, start)
-    size = {"chains": chains, "draws": draws, "progress": progress}
-    cheap = sample_by_importance(problem, whitening, seed, **size)
-    if cheap is not None:
-        mixed = mixing(_free(cheap.values, problem.priors))
-        checks = (*mixing_checks(mixed, chains), _covering(cheap.shape))
-        return SampledPopulation(_flat(cheap.values), checks, "importance sampling")
-    found = sample(problem, whitening, seed, warmup=warmup, **size)
-    mixed = mixing(_free(found.values, problem.priors))
-    checks = sampling_checks(found, mixed)
-    return SampledPopulation(_flat(found.values), checks, "NUTS")
+
+    chains: int = 4
+    warmup: int = 500
+    draws: int = 800
+    seed: int = 0
+    progress: Progress | None = None
+
+    def run(
+        self, name: str, problem: Sampled, start: Mapping[str, float]
+    ) -> tuple[dict[str, np.ndarray], tuple[Check, ...]]:
+        """Return draws by site, of all chains, and the checks of the sampler.
+
+        Args:
+            name: of the quantity, for the checks.
+            problem: its population.
+            start: sites whose value is roughly known.
+        """
+        whitening = laplace.fit(problem, start)
+        size = {"chains": self.chains, "draws": self.draws, "progress": self.progress}
+        cheap = sample_by_importance(problem, whitening, self.seed, **size)
+        if cheap is not None:
+            values = cheap.values
+            checks = (
+                *mixing_checks(mixing(_free(values, problem)), self.chains),
+                _coverage(cheap.shape),
+            )
+        else:
+            found = sample(problem, whitening, self.seed, warmup=self.warmup, **size)
+            values = found.values
+            checks = sampling_checks(found, mixing(_free(values, problem)))
+        named = [replace(one, name=f"{name}: {one.name}") for one in checks]
+        return {site: v.reshape(-1) for site, v in values.items()}, tuple(named)
 
 
-def _covering(shape: float) -> Check:
-    """Return how well proposals follow the posterior."""
+def _coverage(shape: float) -> Check:
+    """Return how well the proposals cover the posterior."""
     words = f"the largest weights have a Pareto k of {shape:.2f}, allowed {MAX_SHAPE}"
     outcome = "passed" if shape <= MAX_SHAPE else "failed"
     return Check("proposals cover the posterior (Pareto k)", outcome, words)
 
 
-def _free(values: Mapping[str, np.ndarray], priors: Mapping[str, Prior]):
-    fixed = {name for name, prior in priors.items() if prior.family == "fixed"}
+def _free(values: Mapping[str, np.ndarray], problem: Sampled) -> dict[str, np.ndarray]:
+    fixed = {n for n, prior in problem.priors.items() if prior.family == "fixed"}
     return {name: v for name, v in values.items() if name not in fixed}
-
-
-def _flat(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    return {name: v.reshape(-1) for name, v in values.items()}
