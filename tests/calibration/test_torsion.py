@@ -14,8 +14,8 @@ from hdcal.calibration.check.check import check
 from hdcal.cli.option_types import read_quantity, unit_findings
 from hdcal.diagnosis.result import Diagnosis
 from hdcal.errors import InputError
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.usable import usable
 from hdcal.prediction.margin.result import Margin
 from hdcal.quantities import FORCE, TORQUE
 

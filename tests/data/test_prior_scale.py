@@ -8,8 +8,8 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.usable import usable
 
 GEAR = """\
 [gear]

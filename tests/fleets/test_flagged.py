@@ -5,9 +5,9 @@ import pytest
 from gear_rows import ordinary
 from scipy.stats import binomtest
 
-from hdcal.fleets.gear_quantity import MOST_FALSE
-from hdcal.fleets.population import QUANTITIES, FittedFleet, fit_population
-from hdcal.fleets.sampling import Sampling
+from hdcal.fleets.model.gear_quantity import MOST_FALSE
+from hdcal.fleets.model.population import QUANTITIES, FittedFleet, fit_population
+from hdcal.fleets.model.sampling import Sampling
 
 
 def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:

@@ -17,7 +17,7 @@ import hdcal
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.fleets.fleet import fleet_of
-from hdcal.fleets.readings import FleetReadings, fleet_readings
+from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.fleets.result import Fleet
 from hdcal.quantities import TORQUE
 from hdcal.report.table_files import columns_csv, frame_parquet

@@ -7,8 +7,13 @@ import pytest
 from scipy import optimize
 from scipy.stats import multivariate_normal
 
-from hdcal.fleets.gear_noise import GearNoise
-from hdcal.fleets.gear_quantity import GearQuantity, Noise, draw_gears, gear_posterior
+from hdcal.fleets.model.gear_noise import GearNoise
+from hdcal.fleets.model.gear_quantity import (
+    GearQuantity,
+    Noise,
+    draw_gears,
+    gear_posterior,
+)
 from hdcal.inference.likelihood import log_likelihood
 
 # One-way layouts. Davies, Statistical Methods in Research and Production (1947): yields

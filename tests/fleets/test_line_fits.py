@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gear_rows import RUNS, SENSE, GearRows, X, bend_shape, ordinary
 
-from hdcal.fleets.line_fits import line_fits
+from hdcal.fleets.model.line_fits import line_fits
 
 
 def rows_of(seed: int, gears: int = 3) -> GearRows:

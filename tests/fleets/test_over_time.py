@@ -7,7 +7,7 @@ from handmade_fleet import fitted
 
 import hdcal
 from hdcal.fleets.over_time import Change, over_time
-from hdcal.fleets.readings import FleetReadings, fleet_readings
+from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 
 DAYS, X = 20, np.linspace(0.05, 0.5, 12)
 

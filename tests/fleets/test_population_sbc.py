@@ -11,9 +11,9 @@ from scipy import stats
 from scipy.linalg import helmert
 
 from hdcal.data.prior import Prior
-from hdcal.fleets import quantities as priors
-from hdcal.fleets.population import fit_population
-from hdcal.fleets.sampling import Sampling
+from hdcal.fleets.model import quantities as priors
+from hdcal.fleets.model.population import fit_population
+from hdcal.fleets.model.sampling import Sampling
 
 # False-alarm probability of each test of one quantity; the seeds are fixed.
 LEVEL = 1e-3

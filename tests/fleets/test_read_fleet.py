@@ -13,11 +13,11 @@ from pyarrow import dataset as tables
 from hdcal.data.loading import derive_motion
 from hdcal.data.measurements import parquet
 from hdcal.data.reading import read_case
-from hdcal.fleets import parquet_readings
-from hdcal.fleets.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.parquet_readings import BatchSums, senses
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading import parquet_readings
+from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
+from hdcal.fleets.reading.parquet_readings import BatchSums, senses
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.usable import usable
 from hdcal.inference.distributions import moments
 
 

@@ -6,10 +6,10 @@ import pytest
 from gear_records import records, refused
 from gear_rows import ordinary
 
-from hdcal.fleets.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.record_faults import curve_fits, faults_among_gears, irregular
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.record_faults import curve_fits, faults_among_gears, irregular
+from hdcal.fleets.reading.usable import usable
 
 ODD = "G3"
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from hdcal.errors import InputError
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.reading.readings import FleetReadings
 
 SIZES = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
 

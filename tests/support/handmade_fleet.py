@@ -8,10 +8,10 @@ import pandas as pd
 import hdcal
 from hdcal.fleets.fleet import fleet_of
 from hdcal.fleets.gear_table import QUANTITIES
-from hdcal.fleets.line_fits import line_fits
-from hdcal.fleets.population import FittedFleet
-from hdcal.fleets.quantities import FleetGroups
-from hdcal.fleets.readings import FleetReadings, fleet_readings
+from hdcal.fleets.model.line_fits import line_fits
+from hdcal.fleets.model.population import FittedFleet
+from hdcal.fleets.model.quantities import FleetGroups
+from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.fleets.result import Fleet
 from hdcal.inference.checks import Check
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
 
-from hdcal.fleets.groups import robust_sd
+from hdcal.fleets.model.groups import robust_sd
 
 # Prior probability of each way.
 WAYS = {"none": 1 / 2, "steps": 1 / 6, "drift": 1 / 6, "days": 1 / 6}

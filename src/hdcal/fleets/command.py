@@ -55,7 +55,7 @@ def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **giv
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
     from hdcal.fleets.next_gear import force_findings
-    from hdcal.fleets.usable import usable
+    from hdcal.fleets.reading.usable import usable
     from hdcal.inference.posterior_file import FILE_NAME
     from hdcal.report.table_files import frame_parquet
 
@@ -97,7 +97,7 @@ def read_gears(console: Console, scheduler: str | None, given: dict[str, Any]):
     """
     from hdcal.data.measurements.gear_files import gear_files
     from hdcal.data.tables.parquet_files import is_parquet
-    from hdcal.fleets.read_fleet import read_fleet
+    from hdcal.fleets.reading.read_fleet import read_fleet
 
     if given["columns"] is None:  # The console has that finding already.
         return None

@@ -16,15 +16,15 @@ from hdcal.fleets.gear_table import (
     gear_table,
     gears_left_out,
 )
-from hdcal.fleets.groups import group_offsets
+from hdcal.fleets.model.groups import group_offsets
+from hdcal.fleets.model.population import FittedFleet, fit_population
+from hdcal.fleets.model.sampling import Sampling
 from hdcal.fleets.next_gear import force_findings, next_force, next_gear
 from hdcal.fleets.over_time import over_time
-from hdcal.fleets.population import FittedFleet, fit_population
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.fleets.reading.usable import usable
 from hdcal.fleets.result import Fleet, Group, Population
-from hdcal.fleets.sampling import Sampling
-from hdcal.fleets.usable import usable
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.report.item import Interval
 from hdcal.versions import versions

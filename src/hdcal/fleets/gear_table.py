@@ -7,9 +7,9 @@ import pandas as pd
 
 from hdcal.data.measurements.bad_gears import cause
 from hdcal.data.theory_names import SPRING
-from hdcal.fleets.gear_quantity import MOST_FALSE
-from hdcal.fleets.population import FittedFleet
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.model.gear_quantity import MOST_FALSE
+from hdcal.fleets.model.population import FittedFleet
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.distributions import moments
 from hdcal.report.item import TAILS, Interval, Item, Probability, Words, quantity
 

@@ -7,12 +7,12 @@ import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.fleets.change_points import changes
-from hdcal.fleets.gear_quantity import MOST_FALSE
-from hdcal.fleets.groups import group_offsets
-from hdcal.fleets.line_fits import line_fits
-from hdcal.fleets.population import FittedFleet
-from hdcal.fleets.quantities import FleetGroups
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.model.gear_quantity import MOST_FALSE
+from hdcal.fleets.model.groups import group_offsets
+from hdcal.fleets.model.line_fits import line_fits
+from hdcal.fleets.model.population import FittedFleet
+from hdcal.fleets.model.quantities import FleetGroups
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.report.item import Count, Interval, Item, Probability, Words
 
 # Probability from which on a change is reported.

@@ -164,5 +164,5 @@ def _unit(site: str) -> str:
     """Return the unit of a site, in N and mm."""
     if site == "stiffness":
         return "N/mm"
-    share = site.endswith(("_share", "_ratio", "_spread"))
+    share = site.endswith(("_share", "_ratio")) or site == "noise_spread"
     return "N" if site.startswith(_IN_NEWTONS) and not share else "1"

@@ -20,15 +20,15 @@ from hdcal.fleets.charts import (
     time_chart,
 )
 from hdcal.fleets.gauge import GaugeRR
-from hdcal.fleets.gear_quantity import MOST_FALSE
 from hdcal.fleets.gear_table import Flagged, LeftOut, with_left_out
-from hdcal.fleets.groups import linked_rigs
+from hdcal.fleets.model.gear_quantity import MOST_FALSE
+from hdcal.fleets.model.groups import linked_rigs
+from hdcal.fleets.model.population import FittedFleet
+from hdcal.fleets.model.quantities import FleetGroups, population_priors
 from hdcal.fleets.next_gear import NextForce, NextGear
 from hdcal.fleets.over_time import Change
-from hdcal.fleets.population import FittedFleet
 from hdcal.fleets.posterior import FleetPosterior
-from hdcal.fleets.quantities import FleetGroups, population_priors
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,

@@ -16,9 +16,9 @@ from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.table import OUTSIDE
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.readings import FleetReadings
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.fleets.reading.usable import usable
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress

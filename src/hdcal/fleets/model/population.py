@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.fleets.gear_noise import gear_noise
-from hdcal.fleets.gear_quantity import GearQuantity, draw_gears
-from hdcal.fleets.groups import group_offsets
-from hdcal.fleets.line_fits import line_fits
-from hdcal.fleets.mounting_sums import MountingSums
-from hdcal.fleets.quantities import (
+from hdcal.fleets.model.gear_noise import gear_noise
+from hdcal.fleets.model.gear_quantity import GearQuantity, draw_gears
+from hdcal.fleets.model.groups import group_offsets
+from hdcal.fleets.model.line_fits import line_fits
+from hdcal.fleets.model.quantities import (
     FleetGroups,
     Problems,
     noise_problem,
     population_priors,
 )
-from hdcal.fleets.readings import FleetReadings
-from hdcal.fleets.sampling import Sampling
+from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.reading.mounting_sums import MountingSums
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import Check
 
 QUANTITIES = ("stiffness", "zero", "noise", "loop", "bend")

@@ -11,7 +11,7 @@ from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
 from hdcal.data.scatter import reading_step
 from hdcal.errors import Finding, InputError, quoted
-from hdcal.fleets.mounting_sums import MountingSums, RowSums, reading_vectors
+from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums, reading_vectors
 from hdcal.inference import distributions
 
 

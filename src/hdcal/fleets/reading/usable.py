@@ -12,9 +12,9 @@ from hdcal.data.gear import at_full_scale
 from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, quoted
-from hdcal.fleets.gear_sizes import gear_sizes
-from hdcal.fleets.readings import FleetReadings
-from hdcal.fleets.record_faults import faults_among_gears
+from hdcal.fleets.reading.gear_sizes import gear_sizes
+from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.fleets.reading.record_faults import faults_among_gears
 
 # From fewer gears next to nothing is known about how much gears differ.
 FEWEST = 3

@@ -14,8 +14,8 @@ from hdcal.data.measurements.screened import screening_notes
 from hdcal.data.reading import read_case
 from hdcal.data.tables.parquet_files import is_parquet
 from hdcal.errors import Finding, InputError, quoted
-from hdcal.fleets.parquet_readings import parquet_readings
-from hdcal.fleets.readings import FleetReadings, fleet_readings
+from hdcal.fleets.reading.parquet_readings import parquet_readings
+from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.screening.result import Observation
 
 # Findings of screening that make a gear faulty; others are dealt with, and noted.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hdcal.fleets.mounting_sums import MountingSums
+from hdcal.fleets.reading.mounting_sums import MountingSums
 
 # Square of a term beside the terms before it, relative to its whole square, below
 # which the readings do not tell its size.

@@ -8,17 +8,17 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.evidence.linear_problem import moments, stiffness_prior
-from hdcal.fleets.gear_noise import GearNoise
-from hdcal.fleets.gear_quantity import GearQuantity, Noise
-from hdcal.fleets.groups import (
+from hdcal.fleets.model.gear_noise import GearNoise
+from hdcal.fleets.model.gear_quantity import GearQuantity, Noise
+from hdcal.fleets.model.groups import (
     Grouping,
     distinguished,
     gains_of_rigs,
     medians_of_groups,
     robust_sd,
 )
-from hdcal.fleets.line_fits import LineFits
-from hdcal.fleets.mounting_sums import MountingSums
+from hdcal.fleets.model.line_fits import LineFits
+from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.inference.problem import problem_priors
 from hdcal.inference.sampled_problem import Sampled
 

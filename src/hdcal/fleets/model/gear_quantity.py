@@ -29,7 +29,7 @@ from jaxtyping import Float, Int
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.exported import jit
-from hdcal.fleets.groups import Grouping, group_offsets, sample_offsets
+from hdcal.fleets.model.groups import Grouping, group_offsets, sample_offsets
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_site
 from hdcal.inference.sampled_problem import Sampled

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.exported import jit
-from hdcal.fleets.gear_quantity import Noise, off_probability
+from hdcal.fleets.model.gear_quantity import Noise, off_probability
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_site
 from hdcal.inference.sampled_problem import Sampled

@@ -13,9 +13,9 @@ import pandas as pd
 from scipy.stats import norm, t
 
 from hdcal.errors import Finding
-from hdcal.fleets.groups import robust_sd
-from hdcal.fleets.mounting_sums import MountingSums, RowSums
-from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.model.groups import robust_sd
+from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.screening.result import MACHINE_CLASS
 from hdcal.screening.wild import FEWEST
 
@@ -150,8 +150,8 @@ def _other_unit(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]
     apart = np.abs(np.log(times))
     far = apart > max(np.log(_OTHER_UNIT), _FAR * robust_sd(apart))
     for gear, ratio in zip(gears[far], times[far], strict=True):
-        words = f"its stiffness is {ratio:.2g} times that of the other gears"
-        yield gear, f"{words}, as in another unit"
+        words = f"{ratio:.0f} times" if ratio >= 1.0 else f"1/{1.0 / ratio:.0f} of"
+        yield gear, f"its stiffness is {words} that of the other gears"
 
 
 def _no_curve(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
