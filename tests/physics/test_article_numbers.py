@@ -1,4 +1,4 @@
-"""The article's gear and its Table 2 give the numbers that docs/audit.md states."""
+"""The article's gear and its Table 2 give the numbers that docs/validation/audit.md states."""
 
 import numpy as np
 import pytest
