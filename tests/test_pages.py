@@ -110,21 +110,22 @@ def test_the_readme_states_what_the_demo_finds(hdcal: Hdcal, tmp_path: Path):
 
 def prior_on_page(prior: Prior) -> str:
     """Return a prior as the page of its effect states it."""
+    unit = "" if prior.unit == "1" else f" {prior.unit}"
     words = {
-        "half_normal": "half-normal {:g}",
-        "normal": "{:g} ± {:g}",
-        "lognormal": "lognormal {:g}, log sd {:g}",
-        "uniform": "uniform {:g} … {:g}",
-        "beta": "beta({:g}, {:g})",
-    }[prior.family].format(*map(float, prior.numbers))
-    return words if prior.unit == "1" else f"{words} [{prior.unit}]"
+        "half_normal": "half-normal, sd {0:g}{unit}",
+        "normal": "normal, {0:g} ± {1:g}{unit}",
+        "lognormal": "lognormal, median {0:g}{unit}, log sd {1:g}",
+        "uniform": "uniform, {0:g} … {1:g}{unit}",
+        "beta": "beta({0:g}, {1:g})",
+    }[prior.family]
+    return words.format(*map(float, prior.numbers), unit=unit)
 
 
 def parameter_rows(effect: str) -> list[str]:
-    """Return the rows of the parameter table of an effect."""
+    """Return the list of the parameters of an effect."""
     priors = effect_priors()
     return [
-        f"| `{name}` | {declared.meaning} | {prior_on_page(prior)} |"
+        f"- `{name}`: {declared.meaning}; {prior_on_page(prior)}"
         for name, declared in parameters(EFFECTS[effect]).items()
         if (prior := priors[f"{effect}.{name}"])
     ]
@@ -135,6 +136,6 @@ def test_the_page_of_an_effect_lists_its_parameters_and_priors():
     assert {page.stem for page in folder.glob("*.md")} == {*EFFECTS, "index"}
     for effect in EFFECTS:
         page = (folder / f"{effect}.md").read_text("utf-8").splitlines()
-        assert [line for line in page if line.startswith("| `")] == parameter_rows(
+        assert [line for line in page if line.startswith("- `")] == parameter_rows(
             effect
         )

@@ -12,11 +12,11 @@ def rows() -> list[str]:
     """Return the table in Markdown, a row for each quantity."""
     others = {name: [n for n, q in NAMES.items() if q == name] for name in RANGES}
     return [
-        "| quantity | lowest | highest | unit | reason |",
-        "|---|---|---|---|---|",
+        "| quantity | range | reason |",
+        "|---|---|---|",
         *(
-            f"| {', '.join(f'`{n}`' for n in (name, *others[name]))} | {r.low:.10g} "
-            f"| {r.high:.10g} | {r.unit} | {r.why} |"
+            f"| {', '.join(f'`{n}`' for n in (name, *others[name]))} "
+            f"| {r.low:g} … {r.high:g} {r.unit} | {r.why} |"
             for name, r in RANGES.items()
         ),
     ]
