@@ -10,35 +10,26 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 import hdcal
-from hdcal.report.answer import Answer, json_schema
 from hdcal.report.result import Result
 
 FOLDER = "schemas"
 
 
-def answers() -> dict[str, type]:
+def answers() -> dict[str, type[Result]]:
     """Return every answer of the package by its format, and its kind if it has one."""
     for module in pkgutil.walk_packages(hdcal.__path__, "hdcal."):
         import_module(module.name)
-    waiting, found = [Answer, Result], {}
+    waiting, found = [Result], {}
     for answer in waiting:  # grows while it is walked along
         waiting += answer.__subclasses__()
         # A class that inherits its format is no answer by itself.
-        if {"schema", "format"} & vars(answer).get("__annotations__", {}).keys():
-            fields = schema_of(answer)["properties"]
+        if "format" in vars(answer).get("__annotations__", {}):
+            fields = answer.json_schema()["properties"]
             stated = [fields.get(key, {}).get("const") for key in ("schema", "kind")]
             name = " ".join(filter(None, stated))
             assert not name or name not in found, f"two answers are called {name}"
             found[name] = answer
-    del found[""]  # The two base classes.
     return dict(sorted(found.items()))
-
-
-def schema_of(answer: type) -> dict:
-    """Return the JSON Schema of an answer."""
-    if issubclass(answer, Result):
-        return answer.json_schema()
-    return json_schema(answer)
 
 
 def file_name(name: str) -> str:
@@ -67,7 +58,7 @@ def write_schemas(app: Sphinx, error: Exception | None) -> None:
     folder = Path(app.outdir) / FOLDER
     folder.mkdir(exist_ok=True)
     for name, answer in answers().items():
-        text = json.dumps(schema_of(answer), indent=2) + "\n"
+        text = json.dumps(answer.json_schema(), indent=2) + "\n"
         (folder / file_name(name)).write_text(text, "utf-8")
 
 

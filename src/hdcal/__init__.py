@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from hdcal.diagnosis.result import Diagnosis
     from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.fleets.fleet import fleet
-    from hdcal.fleets.fleet_posterior import FleetPosterior
+    from hdcal.fleets.posterior import FleetPosterior
+    from hdcal.fleets.result import Fleet
     from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
@@ -43,7 +44,8 @@ _HOMES = {
     "DynamicPosterior": "motion.dynamic_problem",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
-    "FleetPosterior": "fleets.fleet_posterior",
+    "Fleet": "fleets.result",
+    "FleetPosterior": "fleets.posterior",
     "Gear": "data.case",
     "Geometry": "data.records",
     "HdcalError": "errors",

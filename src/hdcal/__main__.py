@@ -26,7 +26,7 @@ from hdcal.design.command import design, study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.fleets.command import fleet
-from hdcal.fleets.force.command import margin
+from hdcal.fleets.margin_command import margin
 from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.report.plain import printable

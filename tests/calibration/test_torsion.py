@@ -1,7 +1,6 @@
 """A torque over an angle is a torsional spring, named so in every answer."""
 
 import io
-import json
 import re
 
 import numpy as np
@@ -15,14 +14,10 @@ from hdcal.calibration.check.check import check
 from hdcal.cli.option_types import read_quantity, unit_findings
 from hdcal.diagnosis.result import Diagnosis
 from hdcal.errors import InputError
-from hdcal.fleets.answer import FleetAnswer
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.summary import fleet_report
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.usable import usable
 from hdcal.prediction.margin.result import Margin
 from hdcal.quantities import FORCE, TORQUE
-from hdcal.report.answer import json_schema
-from hdcal.report.plain import as_json
-from hdcal.report.write import report_files
 
 STIFFNESS = 9000.0  # [N·m/rad]
 SHORT = {"chains": 2, "warmup": 500, "draws": 1000, "seed": 1}
@@ -205,7 +200,8 @@ def test_many_files_and_parquet_keep_their_quantities(tmp_path):
     for source in (folder, tmp_path / "line.parquet"):
         found = read_fleet(source)
         assert found.case.units is TORQUE
-        slopes = found.sums.xy / found.sums.xx
+        products = found.sums.products
+        slopes = products[:, 0, 3] / products[:, 0, 0]
         assert np.max(found.case.records.deformation) < 12.01 * ARCMIN
         assert slopes == pytest.approx(STIFFNESS, rel=0.02)
     forces = {
@@ -214,7 +210,7 @@ def test_many_files_and_parquet_keep_their_quantities(tmp_path):
     }
     pd.DataFrame(forces).to_csv(folder / "d.csv", index=False)
     with pytest.raises(InputError, match="holds forces"):
-        read_fleet(folder)
+        usable(read_fleet(folder))
 
 
 def test_a_length_with_its_unit_is_no_angle():
@@ -239,26 +235,3 @@ def test_a_margin_is_of_torques(posterior):
     for words in (told["headline"], *told["remarks"], text):
         assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)
     assert "N·m" in told["headline"]
-
-
-def test_a_fleet_is_of_torques():
-    rng = np.random.default_rng(5)
-    angle = np.tile(np.linspace(0.0, 12.0 * ARCMIN, 12), 12)
-    gear = np.repeat(np.arange(12), 12)
-    stiffness = STIFFNESS * (1.0 + 0.03 * rng.normal(size=12))
-    torque = stiffness[gear] * angle + 0.1 * rng.normal(size=angle.size)
-    table = {"angle_rad": angle, "torque_Nm": torque}
-    found = hdcal.fleet({**table, "specimen": gear.astype(str)}, seed=1)
-    force = found.posterior.next_force(0.003, 40.0)
-    report = fleet_report(found, force=force)
-    told = json.loads(as_json(report.answer))
-    assert not _in_newtons(_keys(told))
-    centre = told["population"]["stiffness_N_m_per_rad"]
-    assert centre["lo"] < STIFFNESS < centre["hi"]
-    assert told["next_force"]["torque_N_m"]["median"] == pytest.approx(27.0, rel=0.05)
-    assert not _in_newtons({*report.tables()["gears.csv"]})
-    Draft202012Validator(json_schema(FleetAnswer, TORQUE)).validate(told)
-    page = report_files(report.document, report.figures())["report.html"].decode()
-    text = re.sub(r"<(style|script|svg).*?</\1>", "", page, flags=re.DOTALL)
-    for words in (told["headline"], *told["notes"], text):
-        assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)

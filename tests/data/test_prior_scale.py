@@ -8,8 +8,8 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.usable import usable
 
 GEAR = """\
 [gear]
@@ -88,10 +88,10 @@ def test_gears_that_are_left_out_have_no_part_in_it():
     sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
     read = read_fleet(still, sizes)
     assert read.case.gear.full_scale.force > 3900.0
-    left, alone = usable(read, skip_bad=True)[0], read_fleet(others, sizes)
+    left, alone = usable(read, skip_bad=True), read_fleet(others, sizes)
     assert left.case.gear == alone.case.gear
     whole = read_fleet(frame, sizes)
-    assert usable(whole)[0].case.gear == whole.case.gear
+    assert usable(whole).case.gear == whole.case.gear
 
 
 def test_a_zero_that_nobody_states_may_be_anywhere():

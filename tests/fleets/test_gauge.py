@@ -1,11 +1,11 @@
-"""Gauge R&R against the handbook's formulas, written down by hand."""
+"""Gauge R&R against the formulas of the handbook."""
 
 import math
 
 import numpy as np
 import pytest
 
-from hdcal.fleets.gauge import gauge
+from hdcal.fleets.gauge import GaugeRR, gauge_rr
 
 DRAWS = {
     "stiffness": 200.0,
@@ -16,26 +16,24 @@ DRAWS = {
 }
 
 
-def of(deformation=0.5, tolerance=None, **more):
+def of(deformation=0.5, tolerance=None, **more) -> GaugeRR:
     draws = {name: np.full(9, value) for name, value in {**DRAWS, **more}.items()}
-    return gauge(draws, deformation, tolerance)
+    return gauge_rr(draws, deformation, tolerance)
 
 
-def test_shares_are_those_of_the_standard_deviations():
+def test_shares_are_those_of_standard_deviations():
     found = of(tolerance=20.0)
-    of_gauge, gears = math.hypot(0.6, 0.5), 0.03 * 200.0 * 0.5
-    total = math.hypot(of_gauge, gears)
-    assert found.percent_study_variation.median == pytest.approx(
-        100.0 * of_gauge / total
-    )
+    gauge, gears = math.hypot(0.6, 0.5), 0.03 * 200.0 * 0.5
+    study = 100.0 * gauge / math.hypot(gauge, gears)
+    assert found.percent_study_variation.median == pytest.approx(study)
     assert found.percent_tolerance is not None
-    assert found.percent_tolerance.hi == pytest.approx(600.0 * of_gauge / 20.0)
-    assert found.distinct_categories.lo == math.floor(1.41 * gears / of_gauge) == 5
+    assert found.percent_tolerance.hi == pytest.approx(600.0 * gauge / 20.0)
+    assert found.distinct_categories.lo == math.floor(1.41 * gears / gauge) == 5
     assert of().percent_tolerance is None
     assert of(-0.5).gears_N == found.gears_N
 
 
-def test_lots_count_with_the_gears_operators_and_rigs_with_the_gauge():
+def test_lots_belong_to_the_gears_and_operators_and_rigs_to_the_gauge():
     found = of(lot_sd=0.04, operator_sd=0.8)
     assert found.gears_N.median == pytest.approx(0.05 * 200.0 * 0.5)
     assert found.reproducibility_N.median == pytest.approx(1.0)
@@ -43,6 +41,26 @@ def test_lots_count_with_the_gears_operators_and_rigs_with_the_gauge():
     rigs = of(operator_sd=0.8, rig_sd=0.02)
     assert rigs.reproducibility_N.median == pytest.approx(math.hypot(1.0, 2.0))
     assert rigs.gears_N == of().gears_N
-    # Noise that differs from gear to gear counts by its mean square.
+    # The mean square of lognormal noise.
     noisy = of(noise_spread=0.5)
     assert noisy.repeatability_N.median == pytest.approx(0.5 * math.exp(0.25))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "grade"),
+    [
+        (60.0, "good"),
+        (46.0, "acceptable"),
+        (15.7, "acceptable"),
+        (15.5, "not good enough"),
+    ],
+)
+def test_a_gauge_is_graded_by_its_share_of_the_tolerance(tolerance, grade):
+    # Six sds are 4.69 N.
+    assert of(tolerance=tolerance).grade == grade
+
+
+def test_a_grade_that_the_interval_does_not_settle_is_not_given():
+    draws = {name: np.full(99, value) for name, value in DRAWS.items()}
+    draws["sigma"] = np.linspace(0.1, 2.0, 99)
+    assert gauge_rr(draws, 0.5, 20.0).grade == "not settled"

@@ -3,12 +3,10 @@
 import io
 from typing import Literal
 
-import numpy as np
 import pytest
-from matplotlib import image
 from matplotlib.figure import Figure
 
-from hdcal.report.canvas import laid_out, render, style
+from hdcal.report.canvas import render, style
 
 DATE: dict = {"svg": {"Date": None}, "png": {}}
 
@@ -47,18 +45,3 @@ def test_a_figure_can_be_rendered_again():
     for kind in ("svg", "png", "svg"):
         assert render(figure, kind) == saved(twin, kind)
         assert figure.get_layout_engine() is engine and figure.dpi == size
-
-
-def test_one_placing_serves_both_files():
-    """To a hair where each would be placed by itself: within its border."""
-    figure, twin = drawn(), drawn()
-    with laid_out(figure, "svg"):
-        assert render(figure, "svg") == saved(twin, "svg")
-        picture = image.imread(io.BytesIO(render(figure, "png")))
-    alone = image.imread(io.BytesIO(saved(twin, "png")))
-    assert picture.shape == alone.shape
-    edges = [picture[:4], picture[-4:], picture[:, :4], picture[:, -4:]]
-    assert all((edge == 1.0).all() for edge in edges)
-    ink = [np.argwhere((one < 1.0).any(axis=-1)) for one in (picture, alone)]
-    for end in (np.min, np.max):
-        np.testing.assert_allclose(*(end(one, axis=0) for one in ink), atol=3)

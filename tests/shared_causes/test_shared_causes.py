@@ -161,7 +161,7 @@ def test_gears_that_say_too_little_are_named():
         hdcal.causes(hdcal.read_case(few), library=LIBRARY)
     exact = table.assign(
         force_N=np.where(
-            table.specimen == "G6", 9 * table.deformation_mm, table.force_N
+            table.specimen == "G6", 200.0 * table.deformation_mm, table.force_N
         )
     )
     with pytest.raises(hdcal.InputError, match=r"gear 'G6'.*straight line"):

@@ -9,7 +9,6 @@ from posteriors import written_posterior
 
 from hdcal.data.case import Case
 from hdcal.inference.posterior import Posterior
-from hdcal.report.intervals import Interval
 
 # Columns and draws that change their sign with the loading. Parameters of effects are
 # those of effects whose contribution does not change it.
@@ -47,11 +46,6 @@ def mirrored(posterior: Posterior) -> Posterior:
         effects=[effect.name for effect in posterior.effects],
         with_gap=posterior.problem.discrepancy is not None,
     )
-
-
-def turned(span: Interval) -> Interval:
-    """Return an interval of numbers with the other sign."""
-    return Interval(-span.median, -span.hi, -span.lo)
 
 
 def check_same(found, expected, place: str = "margin") -> None:

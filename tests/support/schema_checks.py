@@ -5,19 +5,17 @@ from functools import cache
 import jsonschema
 from jsonschema.exceptions import best_match
 
-from hdcal.report.answer import json_schema
 from hdcal.report.result import Result
 
 
 @cache
-def _checker(answer: type) -> jsonschema.Draft202012Validator:
-    is_result = issubclass(answer, Result)
-    schema = answer.json_schema() if is_result else json_schema(answer)
+def _checker(answer: type[Result]) -> jsonschema.Draft202012Validator:
+    schema = answer.json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     return jsonschema.Draft202012Validator(schema)
 
 
-def obeys(found: object, answer: type) -> None:
+def obeys(found: object, answer: type[Result]) -> None:
     """Check that plain data keeps what the schema of an answer promises.
 
     Raises:

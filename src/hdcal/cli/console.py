@@ -18,11 +18,8 @@ from hdcal.errors import Finding, Findings, quoted
 from hdcal.report.plain import as_json, printable
 
 if TYPE_CHECKING:
-    from hdcal.report.answer import Answer
-    from hdcal.report.document import Document
     from hdcal.report.result import Result
     from hdcal.report.saving import Target
-    from hdcal.report.write import Report
 
 
 def _read_too(out: str) -> list[Finding]:
@@ -116,28 +113,6 @@ class Console:
             click.get_current_context().with_resource(target)
         return target
 
-    def answer(
-        self,
-        document: "Document",
-        answer: "Answer",
-        folder: str | None = None,
-        opened: str = "report.html",
-    ) -> int:
-        """Show an answer and return the command's exit code.
-
-        Args:
-            document: for people.
-            answer: for --json.
-            folder: where the whole result lies, or None.
-            opened: what to open in it first; empty where that depends.
-        """
-        from hdcal.report.terminal import terminal_lines
-
-        self.table(*terminal_lines(document, folder, opened))
-        if self.json:
-            self.data(answer)
-        return 0 if answer.status == "ok" else 1
-
     def show(self, result: "Result", **files: Any) -> int:
         """Write the reserved folder if there is one, print a result, return its code.
 
@@ -165,24 +140,11 @@ class Console:
             self._print(result.to_json().rstrip(), to_error=False)
         return 0 if result.status == "ok" else 1
 
-    def report(self, report: "Report[Answer]") -> int:
-        """Write the reserved folder if there is one, show the answer, return its code.
-
-        Args:
-            report: what to write and show.
-        """
-        from hdcal.report.write import write_report
-
-        if self.folder is not None:
-            write_report(report, self.folder)
-        folder = None if self.folder is None else self.folder.name
-        return self.answer(report.document, report.answer, folder)
-
     def result(self, text: str) -> None:
         """Print the result for people; with --json it moves to standard error."""
         self._print(text, to_error=self.json)
 
-    def data(self, plain: "dict | Answer") -> None:
+    def data(self, plain: dict[str, Any]) -> None:
         """Print the one JSON object."""
         self._print(as_json(plain).rstrip(), to_error=False)
 

@@ -1,1 +1,1 @@
-"""Many gears: which one is off, and how much do they scatter?"""
+"""How stiff is each of many gears, and which of them are not like the others?"""

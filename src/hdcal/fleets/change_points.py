@@ -1,8 +1,8 @@
 """Whether values taken on dates change: not, by steps, steadily, or from day to day.
 
-Each of the four has its evidence in closed form, given by how much values of one level
-scatter, which is integrated over a grid. Levels are told, before the data, in this
-scatter. Steps are those of a product partition: any date may begin a new level.
+Each of the four has its evidence in closed form, given the scatter of values of one
+level, which is integrated over a grid. Before the data, levels scatter in proportion to
+it. Steps are those of a product partition: any date may begin a new level.
 
 Source:
     Barry and Hartigan, Annals of Statistics 20 (1992), product partitions; Fearnhead,
@@ -15,14 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
 
+from hdcal.fleets.model.groups import robust_sd
+
 # Prior probability of each way.
 WAYS = {"none": 1 / 2, "steps": 1 / 6, "drift": 1 / 6, "days": 1 / 6}
-# Levels lie about the middle, before the data, by so many scatters of values, and the
-# ends of a drift twice as far apart.
+# Prior sd of a level in scatters of values; the ends of a drift lie twice as far apart.
 _LEVELS = 1.5
-# Scatters that are tried, in the sd of all values.
+# Grid of scatters, in the sd of all values.
 _GRID = np.geomspace(0.2, 1.6, 25)
-# Steps that are expected before the data.
+# Steps expected before the data.
 _EXPECTED = 1.0
 # Probability of intervals.
 _SURE = 0.95
@@ -33,7 +34,7 @@ class LevelStep:
     """A change of the level.
 
     Attributes:
-        before: index of the last date that lies before it, with 97.5 %.
+        before: index of the last date that lies before it, with 97.5 % probability.
         after: index of the first date that lies after it, likewise.
         size: median, lower and upper end of its 95 % interval.
     """
@@ -45,14 +46,14 @@ class LevelStep:
 
 @dataclass(frozen=True)
 class Changes:
-    """What is known of changes.
+    """Posterior of the ways in which values change.
 
     Attributes:
         ways: probability of each of `WAYS`.
         steps: the likeliest ones, if there are steps.
         drift: from the first date to the last, if it is steady: median, lower and upper
             end of its 95 % interval.
-        days_sd: by which dates differ, if each has a level of its own.
+        days_sd: sd of the levels of dates, if each has its own.
     """
 
     ways: dict[str, float]
@@ -63,10 +64,10 @@ class Changes:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Values by date, one row for each scatter that is tried.
+    """Sums of values by date, one row for each scatter of the grid.
 
     Attributes:
-        weight: Σ 1/(τ² + v), cumulated from nought; [scatter, date + 1].
+        weight: Σ 1/(τ² + v), cumulated from zero; [scatter, date + 1].
         first: Σ e/(τ² + v) likewise.
         second: Σ e²/(τ² + v) + log(τ² + v) likewise.
         level: variance of levels before the data; [scatter, 1].
@@ -78,7 +79,7 @@ class _Sums:
     level: np.ndarray
 
     def segment(self, start, stop) -> np.ndarray:
-        """Return the log evidence of one level from dates on, before others."""
+        """Return the log evidence of one level from dates on to others."""
         mean, variance = self.posterior(start, stop)
         second = self.second[:, stop] - self.second[:, start]
         return 0.5 * (mean**2 / variance + np.log(variance / self.level) - second)
@@ -93,7 +94,7 @@ class _Sums:
 def changes(
     day: np.ndarray, value: np.ndarray, variance: np.ndarray, time: np.ndarray
 ) -> Changes:
-    """Say of values whether, how and when they change.
+    """Return whether, how and when values change.
 
     Args:
         day: index of each value's date, in the order of dates, shape (n,).
@@ -101,7 +102,7 @@ def changes(
         variance: of each value's error, shape (n,).
         time: of each date, ascending, shape (d,), two or more.
     """
-    # One wild value moves neither the middle nor the grid.
+    # One wild value moves neither the median nor the grid.
     value = value - np.median(value)
     sums = _sums(day, value, variance)
     ends = np.arange(len(time) + 1)
@@ -123,13 +124,8 @@ def changes(
     )
 
 
-def middle_sd(value: np.ndarray) -> float:
-    """Return the sd of a normal law by its median absolute deviation from nought."""
-    return float(np.median(np.abs(value)) / ndtri(0.75))
-
-
 def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
-    spread = middle_sd(value) or np.std(value)
+    spread = robust_sd(value) or np.std(value)
     scatter = _GRID[:, None] * max(float(spread), np.finfo(float).tiny ** 0.25)
     total = scatter**2 + variance
     parts = 1.0 / total, value / total, value**2 / total + np.log(total)
@@ -142,10 +138,11 @@ def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
 
 
 def _partitions(sums: _Sums, none: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the log evidence of steps, one or more, and where a level begins.
+    """Return the log evidence of one step or more, and where levels begin.
 
     Returns:
-        Shape (scatter,), and of each date the probability, shape (scatter, date).
+        Log evidence, shape (scatter,), and the probability that a level begins at each
+        date, shape (scatter, date).
     """
     scatters, dates = len(none), sums.weight.shape[1] - 1
     begin = min(_EXPECTED / (dates - 1), 0.5)
@@ -161,7 +158,7 @@ def _partitions(sums: _Sums, none: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         prior = (stop - start - 1) * go_on + np.where(stop < dates, anew, 0.0)
         each = backward[:, stop] + sums.segment([start], stop) + prior
         backward[:, start] = logsumexp(each, axis=1)
-    # Partitions of one level are none of steps, in the data and before them.
+    # A partition of one level has no step, in the data and before them.
     alone = none + (dates - 1) * go_on
     whole = forward[:, -1]
     steps = whole + np.log(-np.expm1(np.minimum(alone - whole, -1e-12)))
@@ -172,7 +169,7 @@ def _partitions(sums: _Sums, none: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _line(sums: _Sums, place: np.ndarray):
-    """Return the log evidence of a straight line, its slope and that one's variance."""
+    """Return the log evidence of a straight line, its slope and its variance."""
     weight, first = np.diff(sums.weight), np.diff(sums.first)
     level = sums.level[:, 0]
     steep = 4.0 * level
@@ -187,12 +184,12 @@ def _line(sums: _Sums, place: np.ndarray):
 
 
 def _steps(sums: _Sums, share: np.ndarray, begins: np.ndarray) -> Iterator[LevelStep]:
-    """Yield the likeliest steps, each where and how large given where the others are.
+    """Yield the likeliest steps, each with place and size given the other steps.
 
     Args:
         sums: of the values.
         share: probability of each scatter.
-        begins: that a level begins at each date, shape (date,).
+        begins: probability that a level begins at each date, shape (date,).
     """
     found = _likeliest(sums, int(np.argmax(share))) or [int(np.argmax(begins))]
     ends = [0, *found, len(begins)]

@@ -1,4 +1,4 @@
-"""Gauge R&R: which part of what force readings scatter by is the gears' own.
+"""Gauge R&R: the scatter of force readings that is not a difference between gears.
 
 Source:
     AIAG, Measurement Systems Analysis, 4th ed. (2010): study variation, tolerance and
@@ -6,47 +6,52 @@ Source:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from hdcal.report.answer import Real
-from hdcal.report.intervals import Interval, credible_interval
+from hdcal.fleets.next_gear import reading_sd
+from hdcal.report.item import Interval, Item, quantity
 
-# Widths of a 97 % interval of the gauge that fit into the gears' scatter.
+# Distinct categories for each sd of the gears in an sd of the gauge.
 _CATEGORIES = 1.41
-# Standard deviations that a tolerance is compared with.
+# Standard deviations that are compared with a tolerance.
 _WIDTH = 6.0
+# Customary upper ends of each grade [%].
+_GOOD, _ACCEPTABLE = 10.0, 30.0
+Grade = Literal["good", "acceptable", "not good enough", "not settled"]
 
 
-@dataclass(frozen=True)
-class GaugeAnswer:
-    """How well one reading of the force tells gears apart; 95 % credible intervals.
+class GaugeRR(Item):
+    """Ability of one reading of the force to distinguish gears; 95 % intervals.
 
     Attributes:
-        deformation_mm: at which it is read, as read.
+        deformation_mm: at which the force is read.
         repeatability_N: sd of readings on one mounting.
-        reproducibility_N: sd between mountings, and operators and rigs where they are
-            told.
-        gears_N: sd between ordinary gears, and lots where they are told.
-        percent_study_variation: gauge over all that scatters, by sds.
-        percent_tolerance: six sds of the gauge over the tolerance; None without one.
-        distinct_categories: gears that one reading can tell apart, a whole number.
+        reproducibility_N: sd between mountings, operators and rigs.
+        gears_N: sd between ordinary gears and lots.
+        percent_study_variation: sd of the gauge over that of all readings.
+        percent_tolerance: six sds of the gauge over the tolerance.
+        distinct_categories: number of gears that one reading can distinguish, rounded
+            down.
+        grade: of the gauge by its share of the tolerance, if there is one, else of the
+            study variation; settled if the whole interval has one grade.
     """
 
-    deformation_mm: Real
-    repeatability_N: Interval
-    reproducibility_N: Interval
-    gears_N: Interval
-    percent_study_variation: Interval
-    percent_tolerance: Interval | None
-    distinct_categories: Interval
+    deformation_mm: float = quantity("deformation as read", "mm")
+    repeatability_N: Interval = quantity("repeatability", "N")
+    reproducibility_N: Interval = quantity("reproducibility", "N")
+    gears_N: Interval = quantity("gears and lots", "N")
+    percent_study_variation: Interval = quantity("share of the study variation", "%")
+    percent_tolerance: Interval | None = quantity("share of the tolerance", "%")
+    distinct_categories: Interval = quantity("distinct categories")
+    grade: Grade
 
 
-def gauge(
+def gauge_rr(
     draws: Mapping[str, np.ndarray], deformation: float, tolerance: float | None = None
-) -> GaugeAnswer:
-    """Return what the scatters of a fleet say of its gauge.
+) -> GaugeRR:
+    """Return the gauge R&R of a population.
 
     Args:
         draws: of the population by site, shape (d,).
@@ -54,23 +59,36 @@ def gauge(
         tolerance: width within which the force may lie [N].
     """
     none = np.zeros(1)
-    # The mean square over gears, whose noise is lognormal.
-    repeat = draws["sigma"] * np.exp(draws["noise_spread"] ** 2)
+    repeat = reading_sd(draws)
     force = draws["stiffness"] * abs(deformation)
     mounted = np.hypot(draws["run_offset_sd"], draws.get("operator_sd", none))
     mounted = np.hypot(mounted, force * draws.get("rig_sd", none))
     gears = force * np.hypot(draws["specimen_sd"], draws.get("lot_sd", none))
-    of_gauge = np.hypot(repeat, mounted)
-    share = 100.0 * of_gauge / np.hypot(of_gauge, gears)
-    told = credible_interval(_CATEGORIES * gears / of_gauge)
-    return GaugeAnswer(
-        deformation_mm=float(deformation),
-        repeatability_N=credible_interval(repeat),
-        reproducibility_N=credible_interval(mounted),
-        gears_N=credible_interval(gears),
-        percent_study_variation=credible_interval(share),
-        percent_tolerance=None
-        if tolerance is None
-        else credible_interval(100.0 * _WIDTH * of_gauge / tolerance),
-        distinct_categories=Interval(*(float(int(end)) for end in vars(told).values())),
+    gauge = np.hypot(repeat, mounted)
+    study = Interval.of(100.0 * gauge / np.hypot(gauge, gears))
+    within = None
+    if tolerance is not None:
+        within = Interval.of(100.0 * _WIDTH * gauge / tolerance)
+    categories = Interval.of(_CATEGORIES * gears / gauge)
+    return GaugeRR(
+        deformation_mm=deformation,
+        repeatability_N=Interval.of(repeat),
+        reproducibility_N=Interval.of(mounted),
+        gears_N=Interval.of(gears),
+        percent_study_variation=study,
+        percent_tolerance=within,
+        distinct_categories=Interval(
+            median=float(int(categories.median)),
+            lo=float(int(categories.lo)),
+            hi=float(int(categories.hi)),
+        ),
+        grade=_grade(within or study),
     )
+
+
+def _grade(share: Interval) -> Grade:
+    if share.hi < _GOOD:
+        return "good"
+    if share.lo >= _GOOD and share.hi < _ACCEPTABLE:
+        return "acceptable"
+    return "not good enough" if share.lo >= _ACCEPTABLE else "not settled"

@@ -1,178 +1,133 @@
-"""Gears of several sizes: a table beside the readings that states those of each one."""
+"""Table of the gears of a fleet, gears.csv, and the gears that are flagged in it."""
 
-from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import Literal, get_args
 
 import numpy as np
+import pandas as pd
 
-from hdcal.data.case import Case, Gear
-from hdcal.data.findings import FileFindings
-from hdcal.data.gear_file.schema import size_faults
-from hdcal.data.measurements.bad_gears import among, bad_gears
-from hdcal.data.plausible import implausible
-from hdcal.data.records import Geometry
-from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.cells import has_comma, read_numbers
-from hdcal.data.tables.headers import parse_header
-from hdcal.data.tables.sources import is_frame, read_source
+from hdcal.data.measurements.bad_gears import cause
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, InputError, quoted
-from hdcal.physics.theory import THEORIES
+from hdcal.fleets.model.gear_quantity import MOST_FALSE
+from hdcal.fleets.model.population import FittedFleet
+from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.inference.distributions import moments
+from hdcal.report.item import TAILS, Interval, Item, Probability, Words, quantity
 
-# Sizes that a table may state, as a gear file calls them.
-SIZES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")
-NAME = "the table of gears"
-_NAMES = {name.removesuffix("_mm") for name in SIZES}
-# What a header speaks of that means a size.
-_LIKE = ("wall", "radius", "length", "load_height", "diameter", "thickness")
-_FIRST_FEW = 3
+QuantityName = Literal["stiffness", "zero", "noise", "loop", "bend"]
+QUANTITIES = get_args(QuantityName)
 
 
-@dataclass(frozen=True)
-class GearSizes:
-    """What a table says of the sizes of gears.
+class Flagged(Item):
+    """A gear that is not like the others.
 
     Attributes:
-        ratio: stiffness at K = 1 of each gear over that of the gear file's sizes, NaN
-            of one whose sizes are missing or cannot be; shape (g,).
-        bad: those gears, each with the first thing that is wrong.
-        findings: all that is wrong with them.
+        quantities: in which it is flagged, each with the probability of being odd.
+        apart_percent: distance of the stiffness from the centre, of the lot if lots are
+            distinguished.
     """
 
-    ratio: np.ndarray
-    bad: Mapping[str, Finding]
-    findings: Sequence[Finding]
+    gear: Words = quantity("gear")
+    quantities: dict[QuantityName, Probability]
+    apart_percent: Interval = quantity("distance from the centre", "%")
+    zero_N: float = quantity("zero", "N")
+    noise_sd_N: float = quantity("noise of a reading", "N")
+    loop_N: float | None = quantity("loop", "N")
+    bend_N: float | None = quantity("bend", "N")
 
 
-def gear_sizes(source: Any, case: Case) -> GearSizes:
-    """Return the sizes of each gear; one that the table does not have is the file's.
+class LeftOut(Item):
+    """A gear that is in none of the numbers."""
+
+    gear: Words
+    why: Words
+
+
+def gear_table(readings: FleetReadings, fit: FittedFleet) -> pd.DataFrame:
+    """Return what is known of each gear, one row a gear.
 
     Args:
-        source: a CSV file or a workbook, or a table in memory, with a column that names
-            the gear, and columns called as `SIZES`.
-        case: the readings, which name their gears.
-
-    Raises:
-        InputError: holds what is wrong with the table, beside single gears.
+        readings: of the gears.
+        fit: of their population.
     """
-    in_memory = is_frame(source)
-    if not in_memory and not isinstance(source, str | Path):
-        remedy = "Give a path, a DataFrame, or arrays by header"
-        raise InputError([Finding("gears", f"is a {type(source).__name__}", remedy)])
-    with FileFindings(NAME if in_memory else str(source)) as findings:
-        if case.gear.theory == SPRING:
-            words = "its sizes say nothing of the stiffness, as no gear file has sizes"
-            findings.refuse(words, "Name one, as `gear` FILE.toml")
-        table, _ = read_source(source, findings)
-    sizes, labels = _read(table, case, findings)
-    bad = bad_gears(findings, table.rows, labels)
-    if findings:
-        # What is wrong without them is wrong with the table.
-        table, again = table.take(~among(labels, bad)), FileFindings(findings.file)
-        sizes, labels = _read(table, case, again)
-        if again:
-            raise InputError(findings)
-    missing = _missing(case, {*labels, *bad}, findings)
-    place = {label: row for row, label in enumerate(labels)}
-    rows = [place.get(gear, -1) for gear in case.specimen_labels]
-    own = {name: np.append(column, np.nan)[rows] for name, column in sizes.items()}
-    measured = {gear: bad[gear] for gear in case.specimen_labels if gear in bad}
-    return GearSizes(_ratio(own, case.gear), measured | missing, findings)
+    case, sums, gears = readings.case, readings.sums, fit.gears
+    ratio = readings.size_ratio
+    own = 1.0 if ratio is None else ratio
+    odd = np.stack([gears[f"off_{name}"] for name in QUANTITIES])
+    flagged = 1.0 - odd <= MOST_FALSE
+    columns = {
+        "gear": case.specimen_labels,
+        **({"lot": case.lots} if case.lots else {}),
+        "rows": np.bincount(sums.gear, sums.rows).astype(int),
+        "runs": np.bincount(sums.gear),
+        "stiffness_N_per_mm": own * gears["stiffness"],
+        "stiffness_lo": own * gears["stiffness_lo"],
+        "stiffness_hi": own * gears["stiffness_hi"],
+        **({} if ratio is None else {"size_ratio": ratio}),
+        **_influence(readings, fit),
+    }
+    names = ["apart_percent", "apart_lo", "apart_hi", "distance_sd"]
+    names += ["zero_N", "noise_sd_N", "loop_N", "bend_N"]
+    columns |= {name: gears[name] for name in names}
+    columns |= {f"off_{name}": gears[f"off_{name}"] for name in QUANTITIES}
+    return pd.DataFrame(columns).assign(
+        probability_off=odd.max(axis=0),
+        flagged=flagged.any(axis=0),
+        flagged_in=[", ".join(np.array(QUANTITIES)[each]) for each in flagged.T],
+        status="failed" if any(c.outcome == "failed" for c in fit.checks) else "ok",
+    )
 
 
-def _read(
-    table: ReadTable, case: Case, findings: FileFindings
-) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Return sizes and gear of each row."""
-    sizes = _sizes(table, findings)
-    at_odds = _at_odds(table, sizes, case.gear.geometry)
-    findings.add_rows(at_odds)
-    return sizes, _labels(table, case, findings)
+def _influence(readings: FleetReadings, fit: FittedFleet) -> dict[str, np.ndarray]:
+    """Return K of every gear: the data determine its product with the modulus only."""
+    gear = readings.case.gear
+    if gear.theory == SPRING:
+        return {}
+    mean, sd = moments(gear.priors["E0"], "E0")
+    rng = np.random.default_rng(int(fit.settings["seed"]))
+    modulus = 1.0 + sd / mean * rng.standard_normal((len(fit.stiffness), 1))
+    low, middle, high = np.quantile(fit.stiffness / (fit.unit * modulus), TAILS, axis=0)
+    return {"K": middle, "K_lo": low, "K_hi": high}
 
 
-def _ratio(stated: dict[str, np.ndarray], gear: Gear) -> np.ndarray:
-    """Return the stiffness of sizes [mm], shape (g,) each, over that of a gear's."""
-    if "length" in stated and "load_height" not in stated:
-        told = "load_height_mm" in gear.source.get("gear", {})
-        stated |= {} if told else {"load_height": stated["length"]}
-    stiffness = THEORIES[gear.theory]
-    own = np.asarray(stiffness(replace(gear.geometry, **stated), 1.0))
-    one = np.asarray(stiffness(gear.geometry, 1.0))
-    return np.broadcast_to(own / one, len(next(iter(stated.values())))).copy()
+def flagged_gears(table: pd.DataFrame) -> tuple[Flagged, ...]:
+    """Return the flagged gears: in stiffness first, then the most probable first."""
+    first = table["flagged_in"].str.contains("stiffness")
+    order = ["first", "probability_off"]
+    found = table.assign(first=first).sort_values(order, ascending=False, kind="stable")
+    found = found.loc[found["flagged"]]
+    return tuple(
+        Flagged(
+            gear=row["gear"],
+            quantities={n: row[f"off_{n}"] for n in row["flagged_in"].split(", ")},
+            apart_percent=Interval(
+                median=row["apart_percent"], lo=row["apart_lo"], hi=row["apart_hi"]
+            ),
+            zero_N=row["zero_N"],
+            noise_sd_N=row["noise_sd_N"],
+            loop_N=None if np.isnan(row["loop_N"]) else row["loop_N"],
+            bend_N=None if np.isnan(row["bend_N"]) else row["bend_N"],
+        )
+        for row in found.to_dict("records")
+    )
 
 
-def _sizes(table: ReadTable, findings: FileFindings) -> dict[str, np.ndarray]:
-    """Return the sizes of each row [mm], by their names in a geometry."""
-    places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
-    for header in table.headers:
-        if table.headers.count(header) > 1 and header in SIZES:
-            findings.add("two columns are called so", "Keep one", None, header)
-        elif header not in SIZES and any(word in header.lower() for word in _LIKE):
-            words = "a size is not read under this name"
-            findings.add(words, f"Call it one of {', '.join(SIZES)}", None, header)
-    if not places:
-        words = "it states no sizes"
-        findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
-    found = {}
-    for header, place in places.items():
-        cells = table.grid.read([place])[place].astype(object)
-        column, bad = read_numbers(cells, has_comma([cells]))
-        for index, words, _ in bad:
-            findings.add(words, "State the size", int(table.rows[index]), header)
-        for index in np.flatnonzero(np.isfinite(column)):
-            for wrong in implausible(header, column[index], "size"):
-                row = int(table.rows[index])
-                findings.add(wrong.problem, wrong.remedy, row, header)
-        found[header.removesuffix("_mm")] = column
-    return found
+def false_discovery_rate(table: pd.DataFrame) -> float | None:
+    """Return the expected share of flagged quantities of gears that are ordinary."""
+    odd = table[[f"off_{name}" for name in QUANTITIES]].to_numpy()
+    rate = 1.0 - odd[1.0 - odd <= MOST_FALSE]
+    return float(rate.mean()) if rate.size else None
 
 
-def _at_odds(
-    table: ReadTable, sizes: Mapping[str, np.ndarray], base: Geometry
-) -> Iterator[tuple[int, str, str]]:
-    """Yield rows whose sizes cannot be beside each other, or those of the gear file."""
-    other = {name: float(size) for name, size in vars(base).items() if name in _NAMES}
-    # Without a height of its own the load acts at the end.
-    if "length" in sizes and other["load_height"] == other["length"]:
-        del other["load_height"]
-    for index, row in enumerate(table.rows):
-        one = other | {name: float(column[index]) for name, column in sizes.items()}
-        for name, words, remedy in size_faults(one):
-            yield int(row), f"{name}_mm: {words}", remedy
+def gears_left_out(readings: FleetReadings) -> tuple[LeftOut, ...]:
+    """Return the gears that were left out, each with the reason."""
+    each = readings.case.left_out.items()
+    return tuple(LeftOut(gear=gear, why=cause(why)) for gear, why in each)
 
 
-def _labels(table: ReadTable, case: Case, findings: FileFindings) -> list[str]:
-    """Return the gear of each row."""
-    known = case.columns.get("specimen")
-    places = [
-        place
-        for place, header in enumerate(table.headers)
-        if header == known or parse_header(header).quantity == "specimen"
-    ]
-    if len(places) != 1:
-        words = "it does not say which gear a row is of"
-        findings.refuse(words, f"Name one column {known or 'specimen'}")
-    labels = table.grid.texts(places[0])
-    seen: set[str] = set()
-    for row, label in zip(table.rows, labels, strict=True):
-        if label in seen:
-            words = f"gear {quoted(label)} has a row already"
-            findings.add(words, "Keep the one that is right", int(row))
-        seen.add(label)
-    return labels
-
-
-def _missing(
-    case: Case, known: Container[str], findings: FileFindings
-) -> dict[str, Finding]:
-    """Return gears that have no row, each with words of its own."""
-    words, remedy = "has no row", "Add its sizes"
-    missing = [label for label in case.specimen_labels if label not in known]
-    for label in missing[:_FIRST_FEW]:
-        findings.add(f"gear {quoted(label)} {words}", remedy)
-    if more := len(missing[_FIRST_FEW:]):
-        findings.add(f"and {more} more gears have none", "Add theirs too")
-    words = f"{words} in {findings.file}"
-    return {label: Finding(findings.file, words, remedy) for label in missing}
+def with_left_out(table: pd.DataFrame, left_out: tuple[LeftOut, ...]) -> pd.DataFrame:
+    """Return the table with gears that were left out below the others."""
+    if not left_out:
+        return table
+    rows = [{"gear": o.gear, "status": f"left out: {o.why}"} for o in left_out]
+    whole = {"rows": "Int64", "runs": "Int64", "flagged": "boolean"}
+    return pd.concat([table.astype(whole), pd.DataFrame(rows)], ignore_index=True)

@@ -1,34 +1,227 @@
-"""Gears that were not measured: the next one, and what many of them will be."""
+"""Gears to come: their stiffness, and the force that one of their readings needs.
 
-from collections.abc import Mapping
+Given the population, both are mixtures of normals about one mean: a gear to come may be
+odd in its stiffness, and odd in its zero, with the probabilities of the population. It
+belongs to a lot, an operator and a rig that were not measured.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize.elementwise import find_root
 from scipy.special import ndtr, ndtri
 
-# Of bounds on many gears.
-CONFIDENCE = 0.95
+from hdcal.data.plausible import implausible
+from hdcal.errors import Finding
+from hdcal.prediction.conditions import far_findings
+from hdcal.quantities import Quantities
+from hdcal.report.item import Interval, Item, Probability, quantity
+
+# Shares of gears to come, and the confidence, of the bounds that are always given.
+CONTENTS, CONFIDENCE = (0.9, 0.99), 0.95
 
 
-def next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
-    """Return the stiffness of one more gear, for each draw [N/mm as read].
+class Bounds(Item):
+    """One-sided bounds of a share of the gears to come, each with the confidence."""
 
-    It is of a lot that was not measured.
+    content: Probability = quantity("share of gears to come")
+    confidence: Probability = quantity("confidence of each bound")
+    at_least: float = quantity("at least")
+    at_most: float = quantity("at most")
+
+
+class Mixture(NamedTuple):
+    """Normal components about one mean, for each draw of the population.
+
+    Attributes:
+        mean: shape (d,).
+        sd: of each component, shape (c, d).
+        weight: of each component, shape (c, d).
     """
-    size = len(draws["stiffness"])
-    off = rng.random(size) < draws["off_share"]
-    wide = np.sqrt(1.0 + off * draws["off_ratio"] ** 2)
-    lots = new_group_sd(draws, "lot")
-    spread = np.hypot(draws["specimen_sd"] * wide, lots)
-    apart = spread * rng.standard_normal(size)
-    return draws["stiffness"] * (1.0 + apart)
+
+    mean: np.ndarray
+    sd: np.ndarray
+    weight: np.ndarray
+
+    def sample(self, seed: int) -> np.ndarray:
+        """Return one member for each draw of the population."""
+        rng = np.random.default_rng(seed)
+        below = np.cumsum(self.weight, axis=0) < rng.random(len(self.mean))
+        component = below.sum(axis=0)[None]
+        sd = np.take_along_axis(self.sd, component, axis=0)[0]
+        return self.mean + sd * rng.standard_normal(len(self.mean))
+
+    def above(self, limit: float) -> np.ndarray:
+        """Return the share of members above a limit, for each draw."""
+        return np.sum(self.weight * ndtr((self.mean - limit) / self.sd), axis=0)
+
+    def bounds(self, content: float, confidence: float) -> Bounds:
+        """Return one-sided bounds of a share of the members, none below zero.
+
+        Each holds with the confidence: in that share of the draws of the population it
+        leaves at least `content` of the members on its side.
+
+        Args:
+            content: the share, above a half.
+            confidence: of each bound.
+        """
+
+        def excess(reach, *parts):
+            half = len(parts) // 2
+            pairs = zip(parts[:half], parts[half:], strict=True)
+            return sum(weight * ndtr(reach / sd) for weight, sd in pairs) - content
+
+        ends = np.zeros_like(self.mean), ndtri(content) * self.sd.max(axis=0)
+        reach = find_root(excess, ends, args=(*self.weight, *self.sd)).x
+        low = float(np.quantile(self.mean - reach, 1.0 - confidence))
+        high = float(np.quantile(self.mean + reach, confidence))
+        given = {"content": content, "confidence": confidence}
+        return Bounds(**given, at_least=max(low, 0.0), at_most=high)
+
+
+class NextGear(Item):
+    """Stiffness of a gear that was not measured; 95 % predictive interval."""
+
+    stiffness_N_per_mm: Interval = quantity("stiffness of the next gear", "N/mm")
+    bounds: tuple[Bounds, ...]
+
+
+class NextForce(Item):
+    """Size of the force of one reading of a gear that was not measured.
+
+    Attributes:
+        force_N: 95 % predictive interval.
+        bounds: for a share of many such gears, each on a new mounting.
+        probability_exceeded: share of gears to come that need more than the limit, 95 %
+            credible interval.
+        beyond_tested: whether the deformation is larger than all that were read.
+    """
+
+    deformation_mm: float = quantity("deformation as read", "mm")
+    force_N: Interval = quantity("force of the next gear", "N")
+    bounds: tuple[Bounds, ...]
+    limit_force_N: float | None = quantity("capacity", "N")
+    probability_exceeded: Interval | None = quantity("share above the capacity")
+    beyond_tested: bool
+
+
+def stiffness_of_gears(draws: Mapping[str, np.ndarray]) -> Mixture:
+    """Return the stiffness of gears to come [N/mm as read].
+
+    Args:
+        draws: of the population by site, shape (d,).
+    """
+    mean, share = draws["stiffness"], draws["off_share"]
+    sd = mean * _relative_sd(draws)
+    return Mixture(mean, sd, np.stack([1.0 - share, share]))
+
+
+def force_of_gears(draws: Mapping[str, np.ndarray], deformation: float) -> Mixture:
+    """Return the size of the force of one reading of each gear to come [N].
+
+    Args:
+        draws: of the population by site, shape (d,).
+        deformation: as read, with the sign of the data [mm].
+    """
+    sense, size = np.sign(deformation) or 1.0, abs(deformation)
+    mean = draws["stiffness"] * size + sense * draws["zero"]
+    force = draws["stiffness"] * size
+    rest = np.hypot(reading_sd(draws), force * new_group_sd(draws, "rig"))
+    rest = np.hypot(rest, new_group_sd(draws, "operator"))
+    shares = draws["off_share"], draws["zero_off_share"]
+    zero_sd = draws["run_offset_sd"] * _wide(draws["zero_off_ratio"])
+    sd, weight = [], []
+    for odd, of_stiffness in enumerate(force * _relative_sd(draws)):
+        for odd_zero, of_zero in enumerate(zero_sd):
+            sd.append(np.sqrt(of_stiffness**2 + of_zero**2 + rest**2))
+            pairs = zip((odd, odd_zero), shares, strict=True)
+            each = [share if is_odd else 1.0 - share for is_odd, share in pairs]
+            weight.append(each[0] * each[1])
+    return Mixture(mean, np.stack(sd), np.stack(weight))
+
+
+def next_gear(draws: Mapping[str, np.ndarray], seed: int) -> NextGear:
+    """Return the stiffness of gears to come."""
+    gears = stiffness_of_gears(draws)
+    return NextGear(
+        stiffness_N_per_mm=Interval.of(gears.sample(seed)),
+        bounds=tuple(gears.bounds(content, CONFIDENCE) for content in CONTENTS),
+    )
+
+
+def next_force(
+    draws: Mapping[str, np.ndarray],
+    deformation: float,
+    limit_force: float | None = None,
+    *,
+    tested: float,
+    seed: int = 0,
+    contents: Sequence[float] = CONTENTS,
+    confidence: float = CONFIDENCE,
+) -> NextForce:
+    """Return the force of gears to come at a deformation.
+
+    Args:
+        draws: of the population by site, shape (d,).
+        deformation: as read, with the sign of the data [mm].
+        limit_force: a capacity, its size [N].
+        tested: largest deformation that was read [mm].
+        seed: of the predictive draws.
+        contents: shares of gears to come of the bounds, above a half each.
+        confidence: of each bound.
+    """
+    gears = force_of_gears(draws, deformation)
+    above = None if limit_force is None else Interval.of(gears.above(limit_force))
+    return NextForce(
+        deformation_mm=deformation,
+        force_N=Interval.of(gears.sample(seed)),
+        bounds=tuple(gears.bounds(content, confidence) for content in contents),
+        limit_force_N=limit_force,
+        probability_exceeded=above,
+        # A deformation is compared with itself as it was written.
+        beyond_tested=abs(deformation) > abs(tested) * (1.0 + 1e-9),
+    )
+
+
+def force_findings(
+    deformation: float | None,
+    limit_force: float | None,
+    largest: float,
+    reach: float,
+    units: Quantities,
+) -> list[Finding]:
+    """Return what is wrong with a deformation and a capacity.
+
+    Args:
+        deformation: as read [mm]; None if no force is asked for.
+        limit_force: the capacity, its size [N].
+        largest: deformation that was read [mm].
+        reach: deformation that no gear of this radius reaches [mm].
+        units: names and units of what was measured.
+    """
+    wrong = implausible("limit_force", limit_force, "sigma")
+    if deformation is None:
+        words, remedy = "has no deformation", "Give `deformation` too"
+        if limit_force is not None:
+            wrong.append(Finding("limit_force", words, remedy))
+        return wrong
+    impossible = implausible("deformation", deformation, units.displacement)
+    unit = units.displacement_unit
+    return wrong + (impossible or far_findings(deformation, abs(largest), reach, unit))
+
+
+def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the root mean square of the noise of ordinary gears, (d,) [N]."""
+    # The noise sd of gears is lognormal.
+    return draws["sigma"] * np.exp(draws["noise_spread"] ** 2)
 
 
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
-    """Return how far a new lot, operator or rig lies from the mean of those told.
+    """Return the sd of a new lot, operator or rig about the mean of those measured.
 
-    Their mean lies as far from that of all as one of them, over the root of their
-    number. Zero where none are told.
+    This mean has an error itself: the sd of one group over the root of their number.
+    The result is zero without such groups.
 
     Args:
         draws: of the population by site, shape (d,).
@@ -36,50 +229,16 @@ def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
     """
     if f"{kind}_sd" not in draws:
         return np.zeros(1)
-    measured = sum(name.startswith(f"{kind}_") for name in draws) - 1
-    measured -= f"{kind}_ratio" in draws
+    measured = sum(name.removeprefix(f"{kind}_").isdigit() for name in draws)
     return draws[f"{kind}_sd"] * np.sqrt(1.0 + 1.0 / measured)
 
 
-def stiffness_bounds(
-    draws: Mapping[str, np.ndarray], content: float
-) -> tuple[float, float]:
-    """Return what a share of gears to come is stiffer than, and softer than [N/mm].
-
-    Each bound holds by itself, with a confidence of `CONFIDENCE`: of so many draws of
-    the population it leaves at least the share on its side.
-
-    Args:
-        draws: of the population by site, shape (d,).
-        content: the share, above a half.
-    """
-    share, ratio = draws["off_share"], draws["off_ratio"]
-    own, lots = draws["specimen_sd"], new_group_sd(draws, "lot")
-    ordinary = np.hypot(own, lots)
-    far = np.hypot(own * np.sqrt(1.0 + ratio**2), lots)
-    wide = far / ordinary
-    high = quantile_of_mixture(content, share, wide)
-    reach = ordinary * high
-    ends = draws["stiffness"] * (1.0 - reach), draws["stiffness"] * (1.0 + reach)
-    return (
-        max(float(np.quantile(ends[0], 1.0 - CONFIDENCE)), 0.0),
-        float(np.quantile(ends[1], CONFIDENCE)),
-    )
+def _relative_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the sd of the stiffness of ordinary and of odd gears, (2, d) [-]."""
+    own = draws["specimen_sd"] * _wide(draws["off_ratio"])
+    return np.hypot(own, new_group_sd(draws, "lot"))
 
 
-def quantile_of_mixture(
-    content: float, share: np.ndarray, wide: np.ndarray
-) -> np.ndarray:
-    """Return how far a share of all members reaches, in sds of ordinary ones.
-
-    Args:
-        content: the share, above a half.
-        share: of members that are off.
-        wide: their sd in that of ordinary ones.
-    """
-
-    def excess(reach, share, wide):
-        return (1.0 - share) * ndtr(reach) + share * ndtr(reach / wide) - content
-
-    ends = np.zeros_like(share), ndtri(content) * wide
-    return find_root(excess, ends, args=(share, wide)).x
+def _wide(ratio: np.ndarray) -> np.ndarray:
+    """Return the sd of ordinary and of odd gears in that of ordinary ones, (2, d)."""
+    return np.stack([np.ones_like(ratio), np.sqrt(1.0 + ratio**2)])

@@ -1,8 +1,8 @@
 """Importance sampling of a posterior with few parameters: a draw costs one density.
 
-Two multivariate t distributions propose, a narrow and a wide one. In rounds they take
-mean and covariance of the weighted proposals; then proposals are resampled. Where they
-cover the posterior badly nothing is returned.
+Three multivariate t distributions propose, of one centre and increasing width. In
+rounds they take mean and covariance of the weighted proposals; then proposals are
+resampled. Where they cover the posterior badly nothing is returned.
 
 Source:
     Cappé, Guillin, Marin and Robert, Journal of Computational and Graphical Statistics
@@ -29,8 +29,9 @@ from hdcal.inference.sampled_problem import Sampled
 MAX_SHAPE = 0.7
 # Tails heavier than a posterior's, which keep weights bounded.
 _FREEDOM = 8.0
-# Share of the wide distribution, and how much wider it is than the weighted proposals.
-_WIDE_SHARE, _WIDER = 0.2, 1.7
+# Shares of the distributions, and their widths in that of the weighted proposals: the
+# widest one reaches tails that fall off exponentially.
+_SHARES, _WIDTHS = np.array([0.65, 0.25, 0.1]), np.array([1.0, 1.7, 3.5])
 # Least variance of the narrow one, in variances at the mode.
 _LEAST_VARIANCE = 0.01
 # Proposals of each round, and the efficiency and Pareto k at which rounds end.
@@ -152,8 +153,8 @@ def _adapted(
 
 def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
     root = np.linalg.cholesky(covariance)
-    share = np.array([1.0 - _WIDE_SHARE, _WIDE_SHARE])
-    return TMixture(share, np.stack([centre, centre]), np.stack([root, _WIDER * root]))
+    centres = np.tile(centre, (len(_WIDTHS), 1))
+    return TMixture(_SHARES, centres, _WIDTHS[:, None, None] * root)
 
 
 def _weights(

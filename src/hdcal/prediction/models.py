@@ -148,8 +148,8 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
         words += " and a quick diagnosis holds none"
         remedy += "; diagnose without quick"
     # A fleet, or its posterior.
-    if hasattr(models, "next_force"):
-        remedy = "Ask its own next_force"
+    if hasattr(models, "margin"):
+        remedy = "Use its method `margin`"
     raise InputError([Finding("models", words, remedy)])
 
 

@@ -15,9 +15,3 @@ def displacement_axis(case: Case) -> str:
 def load_axis(units: Quantities, words: str = "") -> str:
     """Return an axis of forces: what it shows, by default the force, and the unit."""
     return f"{words or units.load} [{units.load_unit}]"
-
-
-def covariate_axis(name: str, unit: str, units: Quantities) -> str:
-    """Return the axis of a covariate, whose unit is written in mm and N."""
-    shown = units.unit(unit)
-    return f"{units.name(name)} [{shown}]" if unit else units.name(name)

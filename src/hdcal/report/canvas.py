@@ -4,32 +4,25 @@ import io
 import logging
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 
 from hdcal.report.plain import printable
 
-# Okabe and Ito's colours, told apart by every kind of colour vision.
-BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#E69F00", "#009E73", "#CC79A7"
-GREY, DARK, RED = "#8a8a8a", "#222222", "#b00020"
-CYCLE = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#D55E00")
 FAILED = "FAILED — do not use"
+_DARK, _RED = "#222222", "#b00020"
 _MARK_LENGTH = 7.1
 # Of a PNG; an SVG is always drawn in points.
 _DPI, _SVG_DPI = 160, 72
-# More points than this tell the eye nothing and make files of many megabytes.
-MOST_DRAWN = 4000
 
 # Where installed, these write what the default font lacks, such as Chinese.
 _FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
@@ -93,7 +86,7 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
         try:
-            with laid_out(figure, kind):
+            with _laid_out(figure, kind):
                 figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
         finally:
             logging.getLogger("matplotlib").setLevel(level)
@@ -101,7 +94,7 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
 
 
 @contextmanager
-def laid_out(figure: Figure, kind: Literal["svg", "png"]) -> Iterator[None]:
+def _laid_out(figure: Figure, kind: Literal["svg", "png"]) -> Iterator[None]:
     """Place what a figure holds, for as many files as are made of it meanwhile.
 
     To place it, `savefig` would draw all of it twice, each time.
@@ -132,7 +125,7 @@ def watermark(figure: Figure) -> None:
         0.5,
         0.5,
         FAILED,
-        color=RED,
+        color=_RED,
         alpha=0.35,
         fontsize=44,
         fontweight="bold",
@@ -145,37 +138,6 @@ def watermark(figure: Figure) -> None:
 
 def heading(axes: Axes, text: str) -> None:
     """Write a small heading above a panel, at its left edge."""
-    axes.set_title(text, loc="left", fontweight="bold", color=DARK)
+    axes.set_title(text, loc="left", fontweight="bold", color=_DARK)
     # What all numbers beside it have in common, 10⁻⁵ say, stands left of the heading.
     axes.yaxis.get_offset_text().set_horizontalalignment("right")
-
-
-def note(axes: Axes, text: str, at: tuple[Any, Any], shift, **look: Any) -> None:
-    """Write a small text beside a place, shifted by so many points."""
-    axes.annotate(
-        text, at, xytext=shift, textcoords="offset points", fontsize=8.5, **look
-    )
-
-
-def name_rows(axes: Axes, names: Sequence[str], *, size: float = 8.5) -> None:
-    """Name the rows of bars at 0, 1, 2, … instead of marking a scale."""
-    axes.set_yticks(range(len(names)), names)
-    axes.tick_params(axis="y", labelsize=size, length=0)
-    axes.grid(False, axis="y")
-
-
-def thinned(size: int) -> np.ndarray:
-    """Return the rows to draw: all of them, or an even-handed choice, in order."""
-    if size <= MOST_DRAWN:
-        return np.arange(size)
-    chosen = np.random.default_rng(0).choice(size, MOST_DRAWN, replace=False)
-    return np.sort(chosen)
-
-
-def temperature_colours(levels: np.ndarray) -> list[str]:
-    """Return one colour per temperature, cold to hot; a single one is blue."""
-    if len(levels) == 1:
-        return [BLUE]
-    # Both ends of the map are too near to black and to white.
-    places = np.interp(levels, [np.min(levels), np.max(levels)], [0.12, 0.86])
-    return [to_hex(colour) for colour in mpl.colormaps["plasma"](places)]

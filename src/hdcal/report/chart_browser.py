@@ -52,7 +52,6 @@ class _Columns:
             "ticks": panel.y_ticks,
             "wide": panel.wide,
             "names": list(panel.names),
-            "marked": [],
             "limits": list(panel.y_limits),
             "log": [panel.x_log, panel.y_log],
             "bands": self._bands,

@@ -1,26 +1,28 @@
 """Parameters of a posterior, with their intervals, in the units of people."""
 
 import math
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import asdict
+
+from pydantic import Field
 
 from hdcal.data.theory_names import SPRING
 from hdcal.inference.diagnostics import Convergence, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
-from hdcal.report.answer import Promise, Real, Words
-from hdcal.report.intervals import Interval, credible_interval
+from hdcal.report.item import Interval, Words
 from hdcal.report.units import UNITS
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterEstimate(Interval):
-    """A parameter with its sampling quality, and who decided it.
+class Quantity(Interval):
+    """An interval with its unit."""
 
-    What does not exist, as for a parameter that the gear file fixes, is NaN.
+    unit: Words
+
+
+class ParameterEstimate(Quantity):
+    """A parameter with its sampling quality; NaN where the gear file fixes it.
 
     Attributes:
-        unit: of the interval.
         rhat: rank-normalised split R-hat.
         ess_bulk: effective draws for the centre.
         ess_tail: effective draws for the interval's ends.
@@ -30,13 +32,12 @@ class ParameterEstimate(Interval):
         driven_by: whether the data or the prior decide it.
     """
 
-    unit: Words
-    rhat: Real
-    ess_bulk: Real
-    ess_tail: Real
-    contraction: Annotated[float, Promise(nullable=True, maximum=1)]
-    prior_sensitivity: Real
-    likelihood_sensitivity: Real
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+    contraction: float = Field(json_schema_extra={"maximum": 1})
+    prior_sensitivity: float
+    likelihood_sensitivity: float
     driven_by: Driver
 
 
@@ -82,5 +83,5 @@ def _estimate(
     posterior: Posterior, name: str, found: Convergence | None
 ) -> ParameterEstimate:
     unit, factor = unit_of(posterior, name)
-    ends = credible_interval(posterior.draws[name] * factor)
-    return ParameterEstimate(**vars(ends), unit=unit, **vars(found or _FIXED))
+    interval = Interval.of(posterior.draws[name] * factor)
+    return ParameterEstimate(**dict(interval), unit=unit, **asdict(found or _FIXED))

@@ -1,7 +1,6 @@
 """The part of a result that follows from its posterior."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -9,11 +8,11 @@ from pydantic import Field, InstanceOf
 
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION, Driver
+from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
 from hdcal.report.item import INTERVAL, Count, Digest, Interval, Item, Words, quantity
-from hdcal.report.parameters import parameter_estimates
+from hdcal.report.parameters import ParameterEstimate, Quantity, parameter_estimates
 from hdcal.report.provenance import data_rows, provenance_rows
 from hdcal.report.result import Result
 from hdcal.report.words import capital, label, prior_words
@@ -21,34 +20,6 @@ from hdcal.report.words import capital, label, prior_words
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 # What a schema says of the names of parameters.
 PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
-
-
-class Quantity(Interval):
-    """An interval with its unit."""
-
-    unit: Words
-
-
-class ParameterEstimate(Quantity):
-    """A parameter with its sampling quality; NaN where the gear file fixes it.
-
-    Attributes:
-        rhat: rank-normalised split R-hat.
-        ess_bulk: effective draws for the centre.
-        ess_tail: effective draws for the interval's ends.
-        contraction: share of the prior's variance that the data removed.
-        prior_sensitivity: to power-scaling of the priors.
-        likelihood_sensitivity: to power-scaling of the likelihood.
-        driven_by: whether the data or the prior decide it.
-    """
-
-    rhat: float
-    ess_bulk: float
-    ess_tail: float
-    contraction: float = Field(json_schema_extra={"maximum": 1})
-    prior_sensitivity: float
-    likelihood_sensitivity: float
-    driven_by: Driver
 
 
 class Sampling(Item):
@@ -174,10 +145,7 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
         "units": case.units,
         "part": "part" if posterior.theory == SPRING else "gear",
         "warnings": tuple(capital(c.words) for c in checks if c.outcome == "warning"),
-        "parameters": {
-            name: ParameterEstimate(**asdict(one))
-            for name, one in parameter_estimates(posterior).items()
-        },
+        "parameters": parameter_estimates(posterior),
         "stiffness_N_per_mm": Interval.of(posterior.draws["stiffness"]),
         "flat_directions": tuple(c.words for c in checks if c.outcome == "note"),
         "checks": checks,

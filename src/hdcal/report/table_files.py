@@ -19,10 +19,10 @@ def columns_csv(columns: Mapping[str, Any]) -> str:
     return text.replace("\r\n", "\n")
 
 
-def columns_parquet(columns: Mapping[str, np.ndarray]) -> bytes | None:
+def frame_parquet(frame: pd.DataFrame) -> bytes | None:
     """Content of a Parquet file; None where pyarrow is not installed."""
     try:
-        return pd.DataFrame(dict(columns)).to_parquet(index=False)
+        return frame.to_parquet(index=False)
     except ImportError:  # pip install "hdcal[files]"
         return None
 

@@ -1,13 +1,11 @@
 """Numbers, priors and names in the form in which people read them."""
 
 import math
-from collections.abc import Mapping
 from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.theory_names import SPRING
 from hdcal.quantities import FORCE, Quantities
-from hdcal.report.intervals import Interval
 from hdcal.report.units import UNITS
 
 LABELS = {
@@ -75,20 +73,6 @@ def known(value: float | None) -> TypeGuard[float]:
     return value is not None and math.isfinite(value)
 
 
-def or_zero(value: float | None) -> float:
-    """Return a number, zero where there is none."""
-    return value if known(value) else 0.0
-
-
-def estimate(entry: Interval | Mapping) -> tuple[str, str]:
-    """Return median and interval as two texts."""
-    if not isinstance(entry, Interval):
-        entry = Interval(*(entry[name] for name in ("median", "lo", "hi")))
-    width = None if entry.lo is None or entry.hi is None else entry.hi - entry.lo
-    span = f"{number(entry.lo, width)} … {number(entry.hi, width)}"
-    return number(entry.median, width), span
-
-
 def unit(name: str) -> str:
     """Return a unit as it is written behind a number."""
     return {"1": "", "degC": "°C", "C": "°C"}.get(name, name)
@@ -134,18 +118,6 @@ _HYPOTHESES = {"none": "no gap", "unknown": "something outside the library"}
 def hypothesis(name: str) -> str:
     """Return a hypothesis as people say it: `a+b` is a and b."""
     return " and ".join(_HYPOTHESES.get(part, label(part)) for part in name.split("+"))
-
-
-def likely(probabilities: dict[str, float], share: float = 0.9) -> list[str]:
-    """Return the fewest hypotheses that hold a share of the probability."""
-    ranked = sorted(probabilities, key=lambda name: -or_zero(probabilities[name]))
-    total, chosen = 0.0, []
-    for name in ranked:
-        if total >= share:
-            break
-        total += or_zero(probabilities[name])
-        chosen.append(name)
-    return chosen
 
 
 def percent(share: float | None) -> str:

@@ -63,6 +63,7 @@ class Observation:
         run: index of the run.
         where: the rows as their file names them.
         words: the finding in a sentence without a full stop.
+        gear: label of the gear whose record it is.
     """
 
     kind: Kind
@@ -73,6 +74,7 @@ class Observation:
     run: int = 0
     where: str = ""
     words: str = ""
+    gear: str = ""
 
     @property
     def count(self) -> int:

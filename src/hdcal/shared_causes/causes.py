@@ -16,9 +16,9 @@ from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.table import OUTSIDE
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.readings import FleetReadings
-from hdcal.fleets.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.fleets.reading.usable import usable
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
@@ -83,7 +83,7 @@ def causes(
         wrong += implausible("seed", seed)
         effects = wrong.attempt(library_of, library)
     assert effects is not None
-    readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
+    readings = read_fleet(data, gear, columns=columns)
     require_force(readings.case, "causes")
     case, gears = usable_gears(readings, effects, skip_bad=skip_bad)
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
@@ -112,7 +112,7 @@ def usable_gears(
     Raises:
         InputError: there is a finding for each gear that cannot be used.
     """
-    readings = usable(readings, skip_bad=skip_bad)[0]
+    readings = usable(readings, skip_bad=skip_bad)
     case, rows = readings.case, int(readings.sums.rows.sum())
     if len(case.records.force) < rows:
         words = f"only {len(case.records.force)} of {rows} rows fit into memory"
@@ -123,7 +123,7 @@ def usable_gears(
     if bad and not skip_bad:
         raise InputError([*bad.values(), offer(bad, len(gears))])
     if bad:
-        case = usable(readings.without(bad))[0].case
+        case = readings.without(bad).case
         gears = gears_of(case)
     return case, gears
 

@@ -47,7 +47,7 @@ def causes(
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
         effects = wrong.attempt(choose_library, library, EFFECTS)
-        readings = read_gears(console, None, given | {"skip_bad": skip_bad})
+        readings = read_gears(console, None, given)
         if readings is not None:
             from hdcal.shared_causes.causes import usable_gears
 

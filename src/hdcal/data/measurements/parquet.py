@@ -14,7 +14,7 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.measurements.gear_files import GEAR_NAME
 from hdcal.data.measurements.measurements import Measurements, measured_in
 from hdcal.data.measurements.notes import source_notes
-from hdcal.data.measurements.screened import asked_range, screened, screening_notes
+from hdcal.data.measurements.screened import asked_range
 from hdcal.data.reading import gear_of
 from hdcal.data.tables.arrays import arrow_grid
 from hdcal.data.tables.blocks import ReadTable
@@ -134,7 +134,7 @@ def _plain(schema: "Schema") -> list[str]:
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
-    """Yield the rows of one file of a source, in their order and screened.
+    """Yield the rows of one file of a source, in their order, not screened.
 
     Raises:
         InputError: holds the faults of the first batch that has some.
@@ -145,16 +145,12 @@ def read_batches(
     headers = [names[column.position] for column in source.used.values()]
     places = {q: place for place, q in enumerate(source.used)}
     used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
-    wanted = asked_range(source.range)
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
             grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
             table = ReadTable(tuple(headers), first, grid, rows.num_rows)
             how: dict = {"skip_bad": skip_bad, "whole": False}
             read = measured_in(table, used, findings, source.gear, **how)
-        if len(read.frame):
-            read, screening = screened(read, wanted, skip_bad, whole=False)
-            read = replace(read, notes=tuple(screening_notes(screening, read.units)))
         yield read
 
 

@@ -72,7 +72,11 @@ def screened(
             raise InputError([Finding("range", words, FORM)])
         result = in_range(result, wanted, run, units)
     reach, each = result.working_range, result.observations
-    words = tuple(in_words(one, rows, reach, units) for one in each)
+    gears = measured["specimen"]
+    words = tuple(
+        replace(in_words(one, rows, reach, units), gear=str(gears[one.rows[0][0]]))
+        for one in each
+    )
     result = replace(result, observations=words)
     kept = int(result.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):

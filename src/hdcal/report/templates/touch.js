@@ -55,8 +55,7 @@ function touch(figure) {
     return chart.names[Math.round(value) - 1] ?? "";
   }
 
-  // An axis of names: level where all of them have room, else upright and some left out,
-  // but none of those that are marked.
+  // An axis of names: level where all of them have room, else upright and some left out.
   function named(chart) {
     const longest = Math.min(26, Math.max(...chart.names.map(name => name.length)));
     const wide = 7 * longest + 12;
@@ -68,11 +67,10 @@ function touch(figure) {
       incrs: [1, 2, 5].flatMap(
         n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
       splits: (_, axis, low, high, step) => {
-        const kept = chart.marked.filter(at => low <= at && at <= high);
-        const others = [];
+        const places = [];
         for (let at = step * Math.ceil(low / step); at <= high; at += step)
-          if (kept.every(one => Math.abs(one - at) >= step)) others.push(at);
-        return [...kept, ...others].sort((a, b) => a - b);
+          places.push(at);
+        return places;
       },
       values: (_, places) => places.map(place => placed(chart, place).slice(0, 26)),
     };

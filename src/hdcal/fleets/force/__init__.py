@@ -1,1 +1,0 @@
-"""What force will gears to come of a fleet need?"""

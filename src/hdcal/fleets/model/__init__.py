@@ -1,0 +1,1 @@
+"""The population of the gears and each gear in it."""

@@ -1,0 +1,144 @@
+"""Noise of the readings of every gear: ordinary gears differ little, a few a lot.
+
+ν degrees of freedom with the standard deviation s tell −ν (log σ + ½ s²/σ²) of the
+noise σ of a gear. log σ is normal about the centre of all gears; of an odd gear it is
+wider by √(1 + ratio²). σ is integrated by Gauss and Hermite's rule about its mode.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import numpyro
+from jaxtyping import Float
+
+from hdcal.data.prior import Prior
+from hdcal.data.records import Array
+from hdcal.exported import jit
+from hdcal.fleets.model.gear_quantity import Noise, off_probability
+from hdcal.inference.likelihood import log_likelihood
+from hdcal.inference.model import sample_site
+from hdcal.inference.sampled_problem import Sampled
+
+# Nodes about the mode: places in standard deviations, and weights.
+_PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(4)
+_LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
+# Newton steps to the mode.
+_NEWTON = 8
+
+
+class GearNoise(Sampled):
+    """Residual noise of every gear.
+
+    Attributes:
+        priors: of the sites centre [N], spread (of the logarithm), off_share and
+            off_ratio.
+        freedom: degrees of freedom of each gear; 0 where nothing is known.
+        log_sd: logarithm of the residual sd of each gear [N].
+    """
+
+    priors: dict[str, Prior]
+    freedom: Float[Array, " g"]
+    log_sd: Float[Array, " g"]
+
+    def some(self, gears: np.ndarray) -> "GearNoise":
+        """Return the residuals of some gears, by their indices."""
+        return replace(self, freedom=self.freedom[gears], log_sd=self.log_sd[gears])
+
+    def declare(self) -> None:
+        """Declare the joint density of the population and all residuals to NumPyro."""
+        values = {name: sample_site(name, p) for name, p in self.priors.items()}
+        numpyro.factor("residuals", log_likelihood(self, values))
+
+
+class NoisePosterior(NamedTuple):
+    """Each gear given one draw of the population; [gear, node, kind].
+
+    Attributes:
+        log_joint: log density of its residuals, of the node and of its kind.
+        log_sd: logarithm of its noise sd.
+    """
+
+    log_joint: Float[Array, "g u k"]
+    log_sd: Float[Array, "g u k"]
+
+
+def noise_posterior(problem: GearNoise, values: Mapping) -> NoisePosterior:
+    """Return what the residuals of each gear tell, given one draw of the population."""
+    wide = jnp.stack([jnp.ones(()), jnp.sqrt(1.0 + values["off_ratio"] ** 2)])
+    spread = values["spread"] * wide
+    own = (problem.log_sd - jnp.log(values["centre"]))[:, None]
+    mode, width = _mode(problem.freedom[:, None], own, spread)
+    places = _PLACES[:, None]
+    place = mode[:, None] + width[:, None] * places
+    away = spread * place - own[:, None]
+    free = problem.freedom[:, None, None]
+    share = values["off_share"]
+    log_joint = (
+        -free * (away + 0.5 * jnp.exp(-2.0 * away))
+        + _LOG_WEIGHTS[:, None]
+        + 0.5 * (places**2 - place**2)
+        + jnp.log(width)[:, None]
+        + jnp.log(jnp.stack([1.0 - share, share]))
+    )
+    return NoisePosterior(log_joint, jnp.log(values["centre"]) + spread * place)
+
+
+def _mode(free, own, spread):
+    """Return where log σ likely lies, in its own sds about the centre, and its sd."""
+    # What σ is alike far below the residual sd pulls exponentially: begin above it.
+    mode = jnp.where(free > 0.0, own / spread, 0.0)
+    mode = 2.0 * free * spread**2 * mode / (1.0 + 2.0 * free * spread**2)
+    for _ in range(_NEWTON):
+        square = free * spread * jnp.exp(2.0 * (own - spread * mode))
+        mode += (square - free * spread - mode) / (1.0 + 2.0 * spread * square)
+    square = free * spread * jnp.exp(2.0 * (own - spread * mode))
+    width = 1.0 / jnp.sqrt(1.0 + 2.0 * spread * square)
+    # Where nodes lie changes the integral by the error of the rule only: the gradient
+    # without them bends trajectories a little, and no draw, whose density is exact.
+    return jax.lax.stop_gradient((mode, width))
+
+
+@log_likelihood.register
+def _(problem: GearNoise, values: Mapping) -> Float[Array, ""]:
+    joint = noise_posterior(problem, values).log_joint
+    return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
+
+
+@jit
+def _moments(problem: GearNoise, values: Mapping):
+    """Return mean and sd of log σ and the probability of being odd; [gear]."""
+
+    def one(draw):
+        found = noise_posterior(problem, draw)
+        flat = found.log_joint.reshape(len(problem.freedom), -1)
+        weight = jax.nn.softmax(flat, axis=1)
+        log_sd = found.log_sd.reshape(flat.shape)
+        first, second = (jnp.sum(weight * log_sd**p, axis=1) for p in (1, 2))
+        return first, second, off_probability(found.log_joint)
+
+    first, second, off = (
+        jnp.mean(part, axis=0) for part in jax.lax.map(one, dict(values))
+    )
+    return first, jnp.sqrt(jnp.maximum(second - first**2, 0.0)), off
+
+
+def gear_noise(
+    problem: GearNoise, values: Mapping
+) -> tuple[Noise, np.ndarray, np.ndarray]:
+    """Return the noise of each gear, averaged over draws of the population.
+
+    Args:
+        problem: the residuals.
+        values: draws of the population by site, shape (t,).
+
+    Returns:
+        Nodes of the noise sd; its median, shape (g,) [N]; and the probability of each
+        gear being odd, shape (g,).
+    """
+    middle, sd, off = _moments(problem, values)
+    nodes = jnp.exp(middle[:, None] + sd[:, None] * _PLACES)
+    return Noise(nodes, jnp.asarray(_LOG_WEIGHTS)), np.exp(middle), np.asarray(off)

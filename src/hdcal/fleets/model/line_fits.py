@@ -1,0 +1,183 @@
+"""Straight line, loop and bend of each gear on each rig, by least squares from sums.
+
+A mounting holds sums of products of v = (x, sense, x|x|, y) about its mean. All lines
+of a gear on a rig have one slope and a zero for each mounting. The loop is the force
+of loading above unloading, the bend the deviation of the middle of the curve.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hdcal.fleets.reading.mounting_sums import MountingSums
+
+# Square of a term beside the terms before it, relative to its whole square, below
+# which the readings do not tell its size.
+_COLLINEAR = 0.02
+# Degrees of freedom that must be left beside line, loop and bend.
+_LEAST_FREE = 4.0
+# Relative square that rounding of floating-point numbers leaves.
+_ROUNDING = 1e-12
+# Pooled correlation of neighbours that is taken into account: larger than this, and
+# than so many standard errors.
+_LEAST_CORRELATION, _CLEAR, _MOST_CORRELATION = 0.2, 4.0, 0.99
+
+
+@dataclass(frozen=True)
+class LineFits:
+    """One entry for each gear on each rig on which it moved.
+
+    Attributes:
+        gear: index of the gear, ascending.
+        rig: index of the rig.
+        slope: [N/mm as read].
+        slope_error: its variance over σ², widened for the correlation [1/mm²].
+        loop: force of loading above unloading [N]; NaN where it is not known.
+        loop_error: its variance over σ².
+        bend: [N]; NaN where it is not known.
+        bend_error: its variance over σ².
+        freedom: degrees of freedom of the noise of each gear, shape (g,).
+        log_sd: logarithm of the residual sd of each gear [N], shape (g,).
+        correlation: of neighbouring residuals, pooled; 0 where it is not clear.
+    """
+
+    gear: np.ndarray
+    rig: np.ndarray
+    slope: np.ndarray
+    slope_error: np.ndarray
+    loop: np.ndarray
+    loop_error: np.ndarray
+    bend: np.ndarray
+    bend_error: np.ndarray
+    freedom: np.ndarray
+    log_sd: np.ndarray
+    correlation: float
+
+    @property
+    def widening(self) -> float:
+        """Factor of variances due to the correlation of neighbours."""
+        return (1.0 + self.correlation) / (1.0 - self.correlation)
+
+
+def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFits:
+    """Fit the curves of every gear on every rig.
+
+    Args:
+        sums: of every mounting.
+        rig: index of the rig of each mounting, shape (m,).
+        step: resolution of the force display [N]: readings that it shows on an exact
+            line scatter nevertheless, by rounding.
+    """
+    rigs, gears = 1 + int(rig.max()), 1 + int(sums.gear.max())
+    pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)
+    gear, of_rig = np.divmod(pairs, rigs)
+    products = _summed(sums.products, pair, len(pairs))
+    free = np.bincount(pair, sums.rows - 1.0)
+    line, bend = _fit(products, (0, 1, 2), free), _fit(products, (0, 2, 1), free)
+    squares = _quadratic(products, line.residual, line.residual)
+    freedom, square = (
+        np.bincount(gear, values, gears)
+        for values in (free - line.known.sum(axis=1), np.maximum(squares, 0.0))
+    )
+    exact = square <= _ROUNDING * np.bincount(gear, products[:, 3, 3], gears)
+    square = np.where(exact, freedom * step**2 / 12.0, square)
+    known = (freedom > 0.0) & (square > 0.0)
+    variance = np.where(known, square, 1.0) / np.where(known, freedom, 1.0)
+    lagged = _summed(sums.lagged, pair, len(pairs))
+    follow = _quadratic(lagged, line.residual, line.residual) / variance[gear]
+    correlation = _correlation(follow[known[gear]], freedom[known])
+    widening = (1.0 + correlation) / (1.0 - correlation)
+    moved, swing = line.known[:, 0], _swing(sums)
+    return LineFits(
+        gear=gear[moved],
+        rig=of_rig[moved],
+        slope=line.size[moved, 0],
+        slope_error=widening * line.error[moved, 0],
+        # The sense is ±1: a loop is twice its coefficient.
+        loop=2.0 * bend.size[moved, 2],
+        loop_error=4.0 * widening * bend.error[moved, 2],
+        bend=swing * line.size[moved, 2],
+        bend_error=swing**2 * widening * line.error[moved, 2],
+        freedom=np.where(known, freedom, 0.0) / widening,
+        log_sd=0.5 * np.log(variance),
+        correlation=correlation,
+    )
+
+
+class _Fit(NamedTuple):
+    """Coefficients of terms, each beside those before it, of p curves.
+
+    Attributes:
+        size: coefficient; NaN where it is not known; shape (p, 3).
+        error: its variance over σ²; shape (p, 3).
+        known: which terms the readings tell apart; shape (p, 3).
+        residual: the residual as a combination of (x, sense, x|x|, y); shape (p, 4).
+    """
+
+    size: np.ndarray
+    error: np.ndarray
+    known: np.ndarray
+    residual: np.ndarray
+
+
+def _fit(products: np.ndarray, order: tuple[int, ...], free: np.ndarray) -> _Fit:
+    """Fit terms in an order, each to what those before it leave.
+
+    The slope comes first: it is that of the straight line alone.
+    """
+    count = len(products)
+    size, error = np.full((2, count, 3), np.nan)
+    known = np.zeros((count, 3), bool)
+    terms: list[np.ndarray] = []
+    residual = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+    for place, column in enumerate(order):
+        term = np.zeros((count, 4))
+        term[:, column] = 1.0
+        for before, earlier in enumerate(terms):
+            share = _quadratic(products, earlier, term) * error[:, before]
+            term -= np.where(known[:, before], share, 0.0)[:, None] * earlier
+        square = _quadratic(products, term, term)
+        whole = products[:, column, column]
+        enough = free - known.sum(axis=1) > (_LEAST_FREE if place else 0.0)
+        told = (square > _COLLINEAR * whole) & (whole > 0.0) & enough
+        known[:, place] = told
+        error[told, place] = 1.0 / square[told]
+        size[told, place] = (_quadratic(products, term, residual) * error[:, place])[
+            told
+        ]
+        residual -= np.where(told, size[:, place], 0.0)[:, None] * term
+        terms.append(term)
+    return _Fit(size, error, known, residual)
+
+
+def _quadratic(products: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    return np.einsum("pi,pij,pj->p", left, products, right)
+
+
+def _summed(parts: np.ndarray, index: np.ndarray, count: int) -> np.ndarray:
+    found = np.zeros((count, *parts.shape[1:]))
+    np.add.at(found, index, parts)
+    return found
+
+
+def _correlation(follow: np.ndarray, freedom: np.ndarray) -> float:
+    """Return the pooled correlation of neighbours, if it is clear.
+
+    Args:
+        follow: sum of the products of neighbouring residuals over their variance.
+        freedom: degrees of freedom of each gear.
+    """
+    whole = float(freedom.sum())
+    found = min(float(follow.sum()) / max(whole, 1.0), _MOST_CORRELATION)
+    least = max(_LEAST_CORRELATION, _CLEAR / np.sqrt(max(whole, 1.0)))
+    return found if found > least else 0.0
+
+
+def _swing(sums: MountingSums) -> float:
+    """Return how far x|x| is off its chord in the middle of a usual range [mm²].
+
+    A range L that is passed evenly has the variance L²/12.
+    """
+    squared = np.minimum(12.0 * sums.products[:, 0, 0] / sums.rows, sums.reach**2)
+    return float(np.median(squared)) / 4.0

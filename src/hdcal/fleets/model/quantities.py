@@ -1,0 +1,318 @@
+"""Priors and data of the population of each quantity of the gears."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.prior import Prior
+from hdcal.evidence.linear_problem import moments, stiffness_prior
+from hdcal.fleets.model.gear_noise import GearNoise
+from hdcal.fleets.model.gear_quantity import GearQuantity, Noise
+from hdcal.fleets.model.groups import (
+    Grouping,
+    distinguished,
+    gains_of_rigs,
+    medians_of_groups,
+    robust_sd,
+)
+from hdcal.fleets.model.line_fits import LineFits
+from hdcal.fleets.reading.mounting_sums import MountingSums
+from hdcal.inference.problem import problem_priors
+from hdcal.inference.sampled_problem import Sampled
+
+_JUDGED = "engineering judgement: "
+ODD_STIFFNESS = Prior("beta", (1.0, 9.0), "1", _JUDGED + "one gear in ten is odd")
+ODD = Prior("beta", (1.0, 99.0), "1", _JUDGED + "one gear in a hundred is odd")
+ODD_RATIO = Prior(
+    "lognormal",
+    (6.0, 0.7),
+    "1",
+    _JUDGED + "odd gears lie some six times as far out as ordinary ones",
+)
+NOISE_SPREAD = Prior(
+    "lognormal",
+    (0.1, 1.2),
+    "1",
+    _JUDGED + "the noise of gears on one rig differs by 1 to 100 %",
+)
+GROUP_RATIO = Prior(
+    "lognormal",
+    (0.7, 1.2),
+    "1",
+    _JUDGED + "lots scatter about as gears of one lot do, seldom a tenth of it or "
+    "seven times as far; zeros of operators as those of mountings, gains of rigs as "
+    "gears",
+)
+# Shares of the largest force: a loop or a bend of all gears, and how much gears differ,
+# by a factor of some four either way.
+_SHAPE, _SHAPE_SPREAD, _SHAPE_LOG_SD = 0.05, 0.005, 1.4
+# Least relative scatter that is noticeable.
+_LEAST = 1e-4
+# Sds from the centre at which few ordinary gears are.
+_FAR = 4.0
+
+# Fewest gears that tell how much gears differ.
+_FEWEST = 3
+
+# A problem with values near its mode, from which a search is short.
+Quantity = tuple[GearQuantity, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class FleetGroups:
+    """Lots, rigs and operators that are distinguished.
+
+    Attributes:
+        lots: names; empty where lots are not distinguished, likewise below.
+        lot: index of the lot of each gear, shape (g,).
+        rigs: names.
+        rig: index of the rig of each mounting, shape (m,).
+        operators: names.
+        operator: index of the operator of each mounting, shape (m,).
+    """
+
+    lots: list[str]
+    lot: np.ndarray
+    rigs: list[str]
+    rig: np.ndarray
+    operators: list[str]
+    operator: np.ndarray
+
+    @classmethod
+    def of(cls, case: Case, run: np.ndarray) -> "FleetGroups":
+        """Return the groups of a case.
+
+        Args:
+            case: with the labels of gears and runs.
+            run: index of the run of each mounting, shape (m,).
+        """
+        lots, lot = distinguished(case.lots)
+        if not lots:
+            lot = np.zeros(len(case.specimen_labels), int)
+        each = []
+        for labels in (case.rigs, case.operators):
+            names, index = distinguished(labels)
+            each += [names, index[run] if names else np.zeros(len(run), int)]
+        return cls(lots, lot, *each)
+
+
+def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
+    """Return the stiffness at K = 1 [N/mm as read], and the priors of a population."""
+    own = problem_priors(case, (), {}, case.gear.theory)
+    half = 0.5 if case.gear.reading == "diametral" else 1.0
+    log_mean, log_sd, nominal = stiffness_prior(case, own)
+    centre = half * float(np.exp(log_mean))
+    zero, gauge_sd = moments(own, "force_offset")
+    contact, contact_sd = moments(own, "deformation_offset")
+    zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
+    return half * nominal, {
+        "stiffness": Prior("lognormal", (centre, log_sd)),
+        "zero": Prior("normal", (zero - centre * contact, zero_sd)),
+        **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
+    }
+
+
+def shape_priors(largest_force: float) -> tuple[Prior, Prior]:
+    """Return the priors of the loop or bend of all gears, and of its scatter [N]."""
+    scatter = _SHAPE_SPREAD * largest_force
+    return (
+        Prior("normal", (0.0, _SHAPE * largest_force)),
+        Prior("lognormal", (scatter, _SHAPE_LOG_SD)),
+    )
+
+
+def noise_problem(
+    fits: LineFits, priors: Mapping[str, Prior]
+) -> tuple[GearNoise, dict[str, float]]:
+    """Return the population of the noise sd of gears."""
+    own = {"centre": priors["sigma"], "spread": NOISE_SPREAD}
+    odd = {"off_share": ODD, "off_ratio": ODD_RATIO}
+    problem = GearNoise(own | odd, fits.freedom, fits.log_sd)
+    known = fits.freedom > 0.0
+    start = (
+        {"centre": float(np.exp(np.median(fits.log_sd[known])))} if any(known) else {}
+    )
+    return problem, _sampled(start, problem)
+
+
+class Problems:
+    """Problems of the quantities of one fleet, all of one structure.
+
+    Args:
+        groups: of gears and mountings.
+        noise: of each gear.
+        noise_sd: its median, shape (g,) [N].
+        priors: of the population.
+        slots: most rows of a gear.
+    """
+
+    def __init__(
+        self,
+        groups: FleetGroups,
+        noise: Noise,
+        noise_sd: np.ndarray,
+        priors: Mapping[str, Prior],
+        slots: int,
+    ):
+        self._groups, self._noise, self._noise_sd = groups, noise, noise_sd
+        self._priors, self._slots = priors, slots
+
+    def stiffness(self, fits: LineFits) -> Quantity:
+        """Return the population of the stiffness, which is relative to the centre."""
+        groups, middle = self._groups, float(np.median(fits.slope))
+        apart = fits.slope / middle - 1.0
+        sd = np.sqrt(fits.slope_error) * self._noise_sd[fits.gear] / middle
+        variance = np.maximum(sd, _LEAST) ** 2
+        found: dict[str, Grouping] = {}
+        if groups.rigs:
+            found["rig"] = gains_of_rigs(apart, variance, fits.gear, fits.rig)
+            apart = apart - found["rig"].offsets[fits.rig]
+        of_gear = _mean(apart, 1.0 / variance, fits.gear, len(groups.lot))
+        if groups.lots:
+            found["lot"] = medians_of_groups(of_gear, groups.lot)
+            of_gear = of_gear - found["lot"].offsets[groups.lot]
+        median, log_sd = self._priors["stiffness"].numbers
+        own = {
+            "_centre": Prior("normal", (float(np.log(median)), float(log_sd))),
+            "spread": self._priors["specimen_sd"],
+            "off_share": ODD_STIFFNESS,
+        }
+        columns = {"value": fits.slope, "error": fits.slope_error, "rig": fits.rig}
+        problem = self._problem(own, fits.gear, columns, found, relative=1.0)
+        start = _start(of_gear, 1.0)
+        start["_centre"] = float(np.log(middle * (1.0 + start["_centre"])))
+        return problem, _sampled(start, problem)
+
+    def zero(
+        self,
+        sums: MountingSums,
+        zeros: np.ndarray,
+        error: np.ndarray,
+        shared: np.ndarray,
+    ) -> Quantity:
+        """Return the population of the zeros, which scatter between mountings.
+
+        Args:
+            sums: of each mounting.
+            zeros: beside the line of the gear, shape (m,) [N].
+            error: variance of their errors over σ², shape (m,).
+            shared: variance of an error that all zeros of a gear share, shape (g,).
+        """
+        operator = self._groups.operator
+        found: dict[str, Grouping] = {}
+        rest = zeros
+        if self._groups.operators:
+            found["operator"] = medians_of_groups(zeros, operator)
+            rest = zeros - found["operator"].offsets[operator]
+        own = {
+            "_centre": self._priors["zero"],
+            "spread": self._priors["run_offset_sd"],
+            "off_share": ODD,
+        }
+        columns = {"value": zeros, "error": error, "operator": operator}
+        problem = self._problem(
+            own, sums.gear, columns, found, shared=shared, by_row=1.0
+        )
+        return problem, _sampled(_start(rest, self._usual_noise), problem)
+
+    def shape(self, fits: LineFits, name: str, largest_force: float) -> Quantity | None:
+        """Return the population of the loop or the bend; None where few gears have one.
+
+        Args:
+            fits: of gears on rigs.
+            name: loop or bend.
+            largest_force: size of it [N].
+        """
+        value, error = getattr(fits, name), getattr(fits, f"{name}_error")
+        known = np.isfinite(value)
+        if len(np.unique(fits.gear[known])) < _FEWEST:
+            return None
+        centre, spread = shape_priors(largest_force)
+        own = {
+            "_centre": centre,
+            "spread": spread,
+            "off_share": ODD,
+        }
+        columns = {"value": value[known], "error": error[known]}
+        problem = self._problem(own, fits.gear[known], columns, {})
+        return problem, _sampled(_start(value[known], self._usual_noise), problem)
+
+    @property
+    def _usual_noise(self) -> float:
+        return float(np.median(self._noise_sd))
+
+    def _problem(
+        self,
+        priors: Mapping[str, Prior],
+        gear: np.ndarray,
+        columns: Mapping[str, np.ndarray],
+        groups: Mapping[str, Grouping],
+        *,
+        shared: np.ndarray | None = None,
+        relative: float = 0.0,
+        by_row: float = 0.0,
+    ) -> GearQuantity:
+        """Return a problem; columns have a value for each row, gear is their gear."""
+        gears = len(self._groups.lot)
+        order = np.argsort(gear, kind="stable")
+        slot = np.empty(len(gear), int)
+        slot[order] = np.arange(len(gear)) - np.searchsorted(gear[order], gear[order])
+
+        def dense(name: str, fill: float, kind: type = float) -> np.ndarray:
+            table = np.full((gears, self._slots), fill, kind)
+            if name in columns:
+                table[gear, slot] = columns[name]
+            return table
+
+        present = np.zeros((gears, self._slots))
+        present[gear, slot] = 1.0
+        priors = {**priors, "off_ratio": ODD_RATIO}
+        priors |= {f"{kind}_ratio": GROUP_RATIO for kind in groups}
+        return GearQuantity(
+            # Without their texts, which would be part of the compiled program.
+            priors={
+                n: Prior(p.family, tuple(map(float, p.numbers)))
+                for n, p in priors.items()
+            },
+            value=dense("value", 0.0),
+            error=dense("error", 1.0),
+            present=present,
+            rig=dense("rig", 0, int),
+            operator=dense("operator", 0, int),
+            shared=np.zeros(gears) if shared is None else shared,
+            lot=self._groups.lot,
+            noise=self._noise,
+            groups=dict(groups),
+            relative=np.asarray(relative),
+            by_row=np.asarray(by_row),
+        )
+
+
+def _mean(values, weight, index, count: int) -> np.ndarray:
+    whole = np.bincount(index, weight, count)
+    mean = np.bincount(index, weight * values, count) / np.where(whole > 0, whole, 1.0)
+    # A gear without a slope of its own lies in the middle.
+    return np.where(whole > 0.0, mean, np.median(values))
+
+
+def _start(values: np.ndarray, unit: float) -> dict[str, float]:
+    """Return centre, scatter and share of odd gears, roughly.
+
+    Args:
+        values: of gears or mountings.
+        unit: a size in which a scatter is noticeable.
+    """
+    middle = float(np.median(values))
+    sd = robust_sd(values - middle)
+    far = np.sum(np.abs(values - middle) > _FAR * sd)
+    start = {"_centre": middle, "off_share": float((1.0 + far) / (10.0 + len(values)))}
+    # A scatter of zero, as of few or of rounded readings, is no place to start from.
+    return start | ({"spread": sd} if sd > _LEAST * unit else {})
+
+
+def _sampled(start: dict[str, float], problem: Sampled) -> dict[str, float]:
+    """Return the start of the sites that are sampled."""
+    fixed = {n for n, prior in problem.priors.items() if prior.family == "fixed"}
+    return {name: value for name, value in start.items() if name not in fixed}

@@ -1,0 +1,1 @@
+"""Readings of many gears, and the faults of their records."""

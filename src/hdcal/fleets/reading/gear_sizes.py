@@ -1,0 +1,144 @@
+"""Gears of several sizes: a table that states those of each gear."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.findings import FileFindings
+from hdcal.data.gear_file.schema import size_faults
+from hdcal.data.measurements.bad_gears import bad_gears
+from hdcal.data.plausible import implausible
+from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.cells import has_comma, read_numbers
+from hdcal.data.tables.headers import parse_header
+from hdcal.data.tables.sources import is_frame, read_source
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, InputError
+from hdcal.physics.theory import THEORIES
+
+# Sizes that a table may state, as a gear file names them.
+SIZES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")
+# Words of headers that mean a size.
+_SIZE_WORDS = ("wall", "radius", "length", "load_height", "diameter", "thickness")
+
+
+def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]:
+    """Return what the sizes of gears make of their stiffness.
+
+    Args:
+        source: a CSV file, a workbook, or a table in memory, with a column that names
+            the gear, and columns named as `SIZES`; others are those of the gear file.
+        case: of the gears.
+
+    Returns:
+        Stiffness of the sizes of each gear over that of the sizes in the gear file,
+        NaN where it is not known, shape (g,); and gears without a size, or with one
+        that cannot be, each with its fault.
+
+    Raises:
+        InputError: holds what is wrong with the table as a whole.
+    """
+    in_memory = is_frame(source)
+    if not in_memory and not isinstance(source, str | Path):
+        remedy = "Give a path, a DataFrame, or arrays by header"
+        raise InputError([Finding("gears", f"is a {type(source).__name__}", remedy)])
+    name = "the table of gears" if in_memory else str(source)
+    with FileFindings(name) as findings:
+        if case.gear.theory == SPRING:
+            words = "its sizes have no meaning, as no gear file states sizes"
+            findings.refuse(words, "Name one, as `gear` FILE.toml")
+        table, _ = read_source(source, findings)
+        places = _size_columns(table, findings)
+        labels = _labels(table, case, findings)
+    faults = FileFindings(name)
+    sizes = {
+        header.removesuffix("_mm"): _column(table, header, place, faults)
+        for header, place in places.items()
+    }
+    faults.add_rows(_at_odds(table, sizes, case.gear))
+    words = "its gear has a row already", "Keep the one that is right"
+    twice = pd.Series(labels).duplicated().to_numpy()
+    faults.add_rows((int(row), *words) for row in table.rows[twice])
+    bad = bad_gears(faults, table.rows, labels)
+    row_of = {label: row for row, label in enumerate(labels) if label not in bad}
+    rows = [row_of.get(gear, -1) for gear in case.specimen_labels]
+    each = {size: np.append(column, np.nan)[rows] for size, column in sizes.items()}
+    missing = Finding(name, "has no row in the table of sizes", "Add its sizes")
+    unsized = {
+        gear: bad.get(gear, missing)
+        for gear in case.specimen_labels
+        if gear not in row_of
+    }
+    return np.broadcast_to(_ratio(each, case.gear), len(rows)), unsized
+
+
+def _labels(table: ReadTable, case: Case, findings: FileFindings) -> list[str]:
+    """Return the gear of each row."""
+    known = case.columns.get("specimen")
+    places = [
+        place
+        for place, header in enumerate(table.headers)
+        if header == known or parse_header(header).quantity == "specimen"
+    ]
+    if len(places) != 1:
+        words = "no column, or more than one, names the gear of a row"
+        findings.refuse(words, f"Name one column {known or 'specimen'}")
+    return table.grid.texts(places[0])
+
+
+def _size_columns(table: ReadTable, findings: FileFindings) -> dict[str, int]:
+    """Return the places of the columns of sizes."""
+    for header in table.headers:
+        if header not in SIZES and any(word in header.lower() for word in _SIZE_WORDS):
+            words = "a size is not read under this name"
+            findings.add(words, f"Name it one of {', '.join(SIZES)}", None, header)
+    places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
+    if not places or len({*table.headers}) < len(table.headers):
+        words = "it has no column of sizes, or two of one name"
+        findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
+    return places
+
+
+def _column(
+    table: ReadTable, header: str, place: int, findings: FileFindings
+) -> np.ndarray:
+    """Return a size of each row [mm], NaN where it is wrong."""
+    cells = table.grid.read([place])[place].astype(object)
+    column, bad = read_numbers(cells, has_comma([cells]))
+    for index, words, _ in bad:
+        findings.add(words, "State the size", int(table.rows[index]), header)
+    for index in np.flatnonzero(np.isfinite(column)):
+        for wrong in implausible(header, column[index], "size"):
+            row = int(table.rows[index])
+            findings.add(wrong.problem, wrong.remedy, row, header)
+    return column
+
+
+def _at_odds(
+    table: ReadTable, sizes: Mapping[str, np.ndarray], gear: Gear
+) -> Iterator[tuple[int, str, str]]:
+    """Yield rows with sizes that are at odds with each other or the gear file's."""
+    names = [name.removesuffix("_mm") for name in SIZES]
+    others = {name: float(getattr(gear.geometry, name)) for name in names}
+    # Without a height of its own the load acts at the end.
+    if "length" in sizes and others["load_height"] == others["length"]:
+        del others["load_height"]
+    for index, row in enumerate(table.rows):
+        each = {name: float(column[index]) for name, column in sizes.items()}
+        for name, words, remedy in size_faults(others | each):
+            yield int(row), f"{name}_mm: {words}", remedy
+
+
+def _ratio(stated: dict[str, np.ndarray], gear: Gear) -> np.ndarray:
+    """Return the stiffness of sizes [mm] over that of the sizes of a gear."""
+    known = stated.keys() | gear.source.get("gear", {}).keys()
+    if "length" in stated and not known & {"load_height", "load_height_mm"}:
+        stated = stated | {"load_height": stated["length"]}
+    stiffness = THEORIES[gear.theory]
+    sized = np.asarray(stiffness(replace(gear.geometry, **stated), 1.0))
+    return sized / np.asarray(stiffness(gear.geometry, 1.0))

@@ -1,0 +1,131 @@
+"""Reading of many gears from any source, and the faults of their records."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hdcal.data.case import Case
+from hdcal.data.measurements.folder import read_gear_folder
+from hdcal.data.measurements.gear_files import gear_files
+from hdcal.data.measurements.parquet import open_parquet
+from hdcal.data.measurements.screened import screening_notes
+from hdcal.data.reading import read_case
+from hdcal.data.tables.parquet_files import is_parquet
+from hdcal.errors import Finding, InputError, quoted
+from hdcal.fleets.reading.parquet_readings import parquet_readings
+from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
+from hdcal.screening.result import Observation
+
+# Findings of screening that make a gear faulty; others are dealt with, and noted.
+_FAULTS = {
+    "after the largest force": "drop of the {load} for good",
+    "jump of both": "jump of {load} and {displacement}",
+    "jump of the deformation": "jump of the {displacement}",
+    "jump of the force": "jump of the {load}",
+    "saturation of the deformation": "saturation of the {displacement}",
+    "saturation of the force": "saturation of the {load}",
+}
+# Notes on records that are listed.
+_LISTED = 20
+
+
+def read_fleet(
+    data: Any,
+    gear: Path | str | Mapping[str, Any] | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    theory: str | None = None,
+    reading: str | None = None,
+    encoding: str | None = None,
+    sheet: str | None = None,
+    specimen: str | None = None,
+    scheduler: str | None = None,
+    range: str | None = None,
+) -> FleetReadings:
+    """Return the readings of many gears; gears with a fault are named in its `faults`.
+
+    Args:
+        data: a case; a file, folder or table in memory as `read_case` takes it; a
+            folder with a file or a case for each gear; a Parquet file, or a folder of
+            them, which are read in batches.
+        gear: as in `read_case`, as are all that follow; a case has its own.
+        columns: quantity -> header.
+        theory: overrides that of the gear file.
+        reading: of the deformation.
+        encoding: of text files.
+        sheet: of a workbook.
+        specimen: label of the only one that is read.
+        scheduler: address of a Dask scheduler, whose workers read the files of a
+            Parquet folder.
+        range: working range.
+
+    Raises:
+        InputError: holds what is wrong with the data as a whole.
+    """
+    if isinstance(data, FleetReadings):
+        return data
+    how: dict = {"columns": columns, "theory": theory, "reading": reading}
+    how |= {"range": range}
+    if is_parquet(data):
+        found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
+        return _with_faults(found, sums.left_out, sums.observed)
+    if scheduler is not None:
+        words = "the data are no Parquet files, which alone are read by several"
+        remedy = "Leave it out, or save the data as Parquet files"
+        raise InputError([Finding("scheduler", words, remedy)])
+    how |= {"encoding": encoding, "skip_bad": True}
+    sizes = None
+    if isinstance(data, Case):
+        case = data
+    elif gear_files(data):
+        case, sizes = read_gear_folder(data, gear, **how)
+    else:
+        case = read_case(data, gear, sheet=sheet, specimen=specimen, **how)
+    faults, observations = {}, ()
+    if case is not data:
+        # Which gears are left out is decided later.
+        faults, case = case.left_out, replace(case, left_out={})
+    if case.screening is not None:
+        observations = case.screening.observations
+        listed = screening_notes(replace(case.screening, trembling=False), case.units)
+        notes = (note for note in case.notes if note not in listed)
+        case = replace(case, notes=tuple(notes))
+    found = replace(fleet_readings(case), sizes=sizes)
+    return _with_faults(found, faults, [(case.name, each) for each in observations])
+
+
+def _with_faults(
+    readings: FleetReadings,
+    left_out: Mapping[str, Finding],
+    observed: Sequence[tuple[str, Observation]],
+) -> FleetReadings:
+    """Return readings with the faults of their gears, and notes on other findings.
+
+    What more than half of the gears show is of the test, and no fault of a gear.
+
+    Args:
+        readings: of all gears that could be read.
+        left_out: those that could not.
+        observed: files and observations of the screening.
+    """
+    case = readings.case
+    showing: dict[str, set[str]] = defaultdict(set)
+    for _, observation in observed:
+        showing[observation.kind].add(observation.gear)
+    half = len(case.specimen_labels) / 2.0
+    faulty = {kind for kind in _FAULTS if len(showing[kind]) <= half}
+    faults, notes = dict(left_out), []
+    remedy = "Correct the record, or leave the gear out"
+    for file, found in observed:
+        if found.kind in faulty:
+            kind = case.units.say(_FAULTS[found.kind])
+            words = f"{kind}: {abs(found.size):.4g} {found.unit} at {found.where}"
+            faults.setdefault(found.gear, Finding(file, words, remedy))
+        else:
+            notes.append(f"gear {quoted(found.gear)}: {found.words}")
+    if more := len(notes[_LISTED:]):
+        notes[_LISTED:] = [f"and {more} more findings in the records"]
+    case = replace(case, notes=(*case.notes, *notes))
+    return replace(readings, case=case, faults=faults)
