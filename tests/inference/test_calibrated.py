@@ -26,7 +26,7 @@ RANKED, BINS = 99, 10
 # False-alarm probability of each uniformity test; the seeds are fixed.
 LEVEL = 1e-3
 # Runs of a slice: a likelihood that is broken shows in as many.
-FEW = 30
+FEW = 20
 COVERAGES = (0.5, 0.9, 0.95)
 MODELS = ["base", "rounded", *EFFECTS]
 

@@ -33,7 +33,7 @@ def exact_posterior(case):
 @pytest.mark.parametrize("rows", slice_of([14, 10_000, 1_000_000], [14]))
 def test_means_and_sds_match_the_closed_form(rows):
     case = case_of(rows)
-    posterior = calibrate(case, seed=3, draws=4000)
+    posterior = calibrate(case, seed=3, warmup=300, draws=3000)
     assert posterior.usable, posterior.reasons
     assert int(posterior.tree["sample_stats"]["diverging"].sum()) == 0
     group = posterior.tree["posterior"].to_dataset()

@@ -13,7 +13,7 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, MAX_TREE_DEPTH, Mixing
 from hdcal.inference.distributions import frozen
-from hdcal.inference.serial_correlation import CORRELATION, worth
+from hdcal.inference.serial_correlation import CORRELATION
 
 if TYPE_CHECKING:
     from hdcal.inference.sample import Draws
@@ -31,9 +31,9 @@ CONFLICT_TAIL = 0.0027
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation that is reported where it is larger with 95 % probability [-].
 _REPORTED_CORRELATION = 0.1
-# A correlation from which intervals are too narrow where readings are worth fewer than
-# so many independent ones (tests/inference/test_correlation_prior.py).
-_STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 26.0
+# A correlation from which intervals are too narrow where readings determine a mean no
+# better than so many independent ones (tests/inference/test_correlation_prior.py).
+_STRONG_CORRELATION, _FEW_EFFECTIVE = 0.5, 26.0
 
 
 @dataclass(frozen=True)
@@ -127,15 +127,17 @@ def correlation_check(
         return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
     span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
-    left = worth(rows, float(middle))
-    if middle < _STRONG_CORRELATION or left > _LITTLE_WORTH:
+    # 1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|: the variance of a mean.
+    effective = (rows - (rows - 2) * middle) / (1.0 + middle)
+    if middle < _STRONG_CORRELATION or effective > _FEW_EFFECTIVE:
         return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
     return Check(
         INDEPENDENT,
         "warning",
         f"{words}. Every interval allows for it, but these readings are worth some "
-        f"{left:.0f} independent ones, and 95 % intervals hold the truth less often: "
-        "in 85 % of ramps of 60 rows with a correlation of 0.9. Read longer, or repeat",
+        f"{effective:.0f} independent ones, and 95 % intervals hold the truth less "
+        "often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read longer, or "
+        "repeat",
     )
 
 
@@ -229,20 +231,3 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
 def listed(names: list[str]) -> str:
     """Return names as a list in words."""
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
-
-
-def identification_checks(
-    without_effect: list[str], flat: list[str]
-) -> tuple[Check, ...]:
-    """Report parameters and directions that the prior decides, from `unidentified`."""
-    seen, apart = "every parameter is seen by the data", "parameters can be told apart"
-    checks = [
-        Check(seen, "note", f"{name}: these data say nothing, the prior is the answer")
-        for name in without_effect
-    ]
-    checks += [Check(apart, "note", sentence) for sentence in flat]
-    if not without_effect:
-        checks.append(Check(seen, "passed", "each one moves the predicted readings"))
-    if not flat:
-        checks.append(Check(apart, "passed", "no direction is left to the priors"))
-    return tuple(checks)

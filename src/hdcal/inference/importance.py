@@ -10,7 +10,6 @@ Source:
     Research 25 (2024), Pareto k.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -23,11 +22,12 @@ from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.inference.diagnostics import pareto_shape
 from hdcal.inference.laplace import Whitening, potential, values_at
+from hdcal.inference.sample import Progress
 from hdcal.inference.sampled_problem import Sampled
 
 # Largest Pareto k of weights whose proposals cover the posterior.
 MAX_SHAPE = 0.7
-# Tails heavier than a posterior's, which keep weights bounded.
+# Degrees of freedom: tails heavier than a posterior's, which keep weights bounded.
 _FREEDOM = 8.0
 # Share of the wide distribution, and how much wider it is than the weighted proposals.
 _WIDE_SHARE, _WIDER = 0.2, 1.7
@@ -41,38 +41,31 @@ _MOST = 12
 _BLOCK = 500
 
 
-class TMixture(NamedTuple):
-    """A mixture of multivariate t distributions of equal degrees of freedom.
+class Proposals(NamedTuple):
+    """A narrow and a wide multivariate t distribution about one centre.
 
     Attributes:
-        share: of each component, shape (k,).
-        centre: shape (k, d).
-        root: Cholesky factor of the scale matrix, shape (k, d, d).
-        freedom: degrees of it.
+        centre: shape (d,).
+        covariance: scale matrix of the narrow one, shape (d, d).
     """
 
-    share: np.ndarray
     centre: np.ndarray
-    root: np.ndarray
-    freedom: float = _FREEDOM
+    covariance: np.ndarray
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Return places, shape (count, d)."""
-        component = rng.choice(len(self.share), count, p=self.share)
-        normal = rng.standard_normal((count, self.centre.shape[1]))
-        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
-        step = np.einsum("nij,nj->ni", self.root[component], normal)
-        return self.centre[component] + tail[:, None] * step
+        step = self._t(1.0).rvs(count, rng).reshape(count, -1) - self.centre
+        wider = np.where(rng.random(count) < _WIDE_SHARE, _WIDER, 1.0)
+        return self.centre + wider[:, None] * step
 
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
-        scipy_t: Any = multivariate_t
-        each = [
-            scipy_t.logpdf(place, centre, root @ root.T, self.freedom)
-            for centre, root in zip(self.centre, self.root, strict=True)
-        ]
-        each = np.reshape(each, (len(self.share), -1))
-        return np.logaddexp.reduce(np.log(self.share)[:, None] + each)
+        narrow, wide = self._t(1.0).logpdf(place), self._t(_WIDER).logpdf(place)
+        return np.logaddexp(np.log1p(-_WIDE_SHARE) + narrow, np.log(_WIDE_SHARE) + wide)
+
+    def _t(self, size: float) -> Any:
+        scale: Any = size**2 * self.covariance
+        return multivariate_t(self.centre, scale, _FREEDOM)  # pyright: ignore
 
 
 class ImportanceDraws(NamedTuple):
@@ -94,7 +87,7 @@ def sample_by_importance(
     *,
     chains: int,
     draws: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> ImportanceDraws | None:
     """Draw from a posterior with few parameters, in its whitened coordinates.
 
@@ -122,16 +115,15 @@ def sample_by_importance(
     level = (np.arange(kept) + rng.random()) / kept
     chosen = np.searchsorted(np.cumsum(weight), level).clip(max=len(place) - 1)
     standard = place[rng.permutation(chosen)].reshape(chains, draws, -1)
-    named = _named(problem, whitening, standard)
-    return ImportanceDraws({n: np.asarray(v) for n, v in named.items()}, shape)
+    return ImportanceDraws(jax.device_get(_named(problem, whitening, standard)), shape)
 
 
 def _adapted(
     problem: Sampled, whitening: Whitening, rng: np.random.Generator
-) -> tuple[TMixture, float]:
+) -> tuple[Proposals, float]:
     """Return proposals, and the effective sample size for each of the last ones."""
     size, efficiency = len(whitening.factor), 0.0
-    proposals = _proposals(np.zeros(size), np.eye(size))
+    proposals = Proposals(np.zeros(size), np.eye(size))
     for count in _ROUNDS:
         place = proposals.draw(count, rng)
         weight = _weights(problem, whitening, proposals, place)
@@ -143,25 +135,18 @@ def _adapted(
         # A few places with most of the weight would decide mean and covariance.
         share = np.minimum(weight, 1.0 / np.sqrt(count))
         share /= share.sum()
-        centre = share @ place
-        off = place - centre
-        covariance = (share * off.T) @ off + _LEAST_VARIANCE * np.eye(size)
-        proposals = _proposals(centre, covariance)
+        covariance = np.cov(place.T, aweights=share, ddof=0).reshape(size, size)
+        covariance += _LEAST_VARIANCE * np.eye(size)
+        proposals = Proposals(share @ place, covariance)
     return proposals, float(efficiency)
-
-
-def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
-    root = np.linalg.cholesky(covariance)
-    share = np.array([1.0 - _WIDE_SHARE, _WIDE_SHARE])
-    return TMixture(share, np.stack([centre, centre]), np.stack([root, _WIDER * root]))
 
 
 def _weights(
     problem: Sampled,
     whitening: Whitening,
-    proposals: TMixture,
+    proposals: Proposals,
     place: np.ndarray,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> np.ndarray:
     """Return the importance weight of each place, shape (n, d); they sum to 1."""
     density = np.empty(len(place))

@@ -17,12 +17,8 @@ from hdcal.inference.marginal import linear_part
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import CORRELATION, given_before
-from hdcal.inference.values import (
-    Values,
-    predict_rows,
-    with_rounding,
-)
+from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.physics.effect import Noise
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the
@@ -100,10 +96,10 @@ def pointwise_log_likelihood(
     mean, noise = predict_rows(problem, values, records, columns)
     noise = with_rounding(noise, problem.step, rounded=problem.rounded)
     if problem.correlated:
-        (sd,), correlation = noise.sd, values[CORRELATION]
-        error = (records.force - mean) / sd
-        mean, sd = given_before(mean, sd, error, before, correlation)
-        noise = Noise(noise.log_weight, sd[None])
+        # Mean and sd of each row given the row before it.
+        (sd,), rho = noise.sd, jnp.where(before >= 0, values[CORRELATION], 0.0)
+        mean = mean + sd * rho * ((records.force - mean) / sd)[before]
+        noise = Noise(noise.log_weight, (sd * jnp.sqrt(1.0 - rho**2))[None])
     return log_probability(
         records.force, mean, noise, problem.step, rounded=problem.rounded
     )

@@ -123,11 +123,9 @@ def _extended(run: "_Run", draws: int) -> Draws:
         found = run.draws()
         values = found.values.items()
         varying = {n: v for n, v in values if v.ndim == 2 and np.ptp(v) > 0.0}
-        if (
-            not _ENOUGH * ESS_PER_CHAIN <= found.energy.shape[1] < _LONGEST * draws
-            or found.diverging.any()
-            or have_mixed(varying)
-        ):
+        length = found.energy.shape[1]
+        may_be_longer = _ENOUGH * ESS_PER_CHAIN <= length < _LONGEST * draws
+        if not may_be_longer or found.diverging.any() or have_mixed(varying):
             return found
         run.advance(draws)
 
@@ -145,7 +143,6 @@ class _Run:
             for chain in range(chains)
         ]
         self._done, self._kept = 0, []
-        self._named, self._values = 0, []
 
     def advance(self, draws: int, *, stop_if_diverging: bool = False) -> None:
         """Draw so many more from each chain, after its warm-up.
@@ -182,14 +179,7 @@ class _Run:
         """Return the draws so far, with their parameters by name."""
         parts = zip(*self._kept, strict=True)
         standard, *statistics = (np.concatenate(part, axis=1) for part in parts)
-        new = standard[:, self._named :]
-        named = _constrain(*self._arguments, new, self._seed, self._named)
-        self._values.append(jax.device_get(named))
-        self._named = standard.shape[1]
-        named = {
-            name: np.concatenate([part[name] for part in self._values], axis=1)
-            for name in named
-        }
+        named = jax.device_get(_constrain(*self._arguments, standard, self._seed))
         return Draws(named, *statistics, target_acceptance=self._target)
 
 
@@ -236,7 +226,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 
 @jit
-def _constrain(problem, whitening, standard, seed, first):
+def _constrain(problem, whitening, standard, seed):
     """Return parameters by name, with draws of the members that were integrated out.
 
     Args:
@@ -244,10 +234,9 @@ def _constrain(problem, whitening, standard, seed, first):
         whitening: coordinates of the sampler.
         standard: draws in these coordinates, (chain, draw, d).
         seed: of the run.
-        first: number of draws of each chain before these.
     """
     _, members = jax.random.split(jax.random.key(seed))
-    place = first + jnp.arange(standard.shape[1])
+    chains, draws, _ = standard.shape
 
     def one(drawn):
         coordinates, key = drawn
@@ -256,8 +245,8 @@ def _constrain(problem, whitening, standard, seed, first):
 
     def chain(coordinates, key):
         # The key of a draw does not depend on the length of the run.
-        keys = jax.vmap(partial(jax.random.fold_in, key))(place)
-        # One draw after the other: members by the thousand would fill the memory.
+        keys = jax.vmap(partial(jax.random.fold_in, key))(jnp.arange(draws))
+        # One draw after the other: members by the hundred would fill the memory.
         return jax.lax.map(one, (coordinates, keys))
 
-    return jax.vmap(chain)(standard, jax.random.split(members, len(standard)))
+    return jax.vmap(chain)(standard, jax.random.split(members, chains))
