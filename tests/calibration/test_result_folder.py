@@ -59,28 +59,21 @@ def test_the_summary_obeys_its_schema_and_is_what_json_prints(calibrated: Calibr
 @pytest.mark.parametrize(
     ("place", "wrong"),
     [
-        (("status",), "failed"),
-        (("parameters", "K"), None),
-        (("parameters", "K", "driven_by"), "hope"),
-        (("parameters", "K", "contraction"), 1.5),
-        (("parameters", "no name"), "as K"),
-        (("K_by_theory",), {}),
-        (("checks",), []),
-        (("sampling", "chains"), 1),
-        (("versions",), {}),
-        (("gear", "theory"), "torus"),
-        (("data", "sha256"), "abc"),
+        ("status", "failed"),
+        ("parameters.K", None),
+        ("parameters.K.driven_by", "hope"),
+        ("parameters.K.contraction", 1.5),
+        ("K_by_theory", {}),
+        ("sampling.chains", 1),
+        ("data.sha256", "abc"),
     ],
 )
-def test_the_schema_refuses_wrong_values(calibrated: Calibrated, place, wrong):
+def test_the_schema_refuses_wrong_values(calibrated: Calibrated, place: str, wrong):
     summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
-    K = summary["parameters"]["K"]
-    summary["parameters"]["effect.parameter"] = K
-    obeys(summary, Calibration)
-    inner = summary
-    for key in place[:-1]:
+    inner, (*keys, last) = summary, place.split(".")
+    for key in keys:
         inner = inner[key]
-    inner[place[-1]] = K if wrong == "as K" else wrong
+    inner[last] = wrong
     with pytest.raises(jsonschema.ValidationError):
         obeys(summary, Calibration)
 

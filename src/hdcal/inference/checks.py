@@ -56,12 +56,7 @@ def _check(name: str, passed: bool, words: str) -> Check:
 
 
 def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
-    """Return the checks on the sampler: any of them failed fails the result.
-
-    Args:
-        draws: from the sampler.
-        mixed: convergence by quantity.
-    """
+    """Return the checks on the sampler: any of them failed fails the result."""
     from arviz_stats.base.array import array_stats
 
     # NaN, which no check passes, where the energy stands still.

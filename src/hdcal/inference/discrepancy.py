@@ -121,12 +121,7 @@ def build_discrepancy(
 def discrepancy_columns(
     discrepancy: Discrepancy | None, records: Records
 ) -> np.ndarray | None:
-    """Return the projected basis at padded rows; None without a discrepancy.
-
-    Args:
-        discrepancy: of the problem, or None.
-        records: of a bucket's length.
-    """
+    """Return the projected basis at padded rows; None without a discrepancy."""
     if discrepancy is None:
         return None
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))

@@ -163,10 +163,6 @@ def identification_checks(
 
     A direction v is flat where the data have less information than the priors:
     ‖J v‖² < ‖v/S‖² with J the sensitivities in noise sds and S the prior sds.
-
-    Args:
-        sensitivities: of the readings to each parameter, in noise sds.
-        priors: by site name.
     """
     # In units of its prior sd every parameter has prior precision one.
     scaled = {n: s * moments(priors[n], n)[1] for n, s in sensitivities.items()}

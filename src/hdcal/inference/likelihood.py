@@ -68,12 +68,7 @@ def log_probability(force, mean, noise: Noise, step, *, rounded: bool):
 
 
 def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]:
-    """Return the precision of each row [1/N²], averaged over the mixture's components.
-
-    Args:
-        error: reading less its mean [N].
-        noise: mixture of normals.
-    """
+    """Return the precision of each row [1/N²], averaged over the mixture."""
     log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
     share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
     return jnp.sum(share / noise.sd**2, axis=0)
@@ -85,13 +80,6 @@ def pointwise_log_likelihood(
     """Return the log likelihood of each row given all values [log 1/N].
 
     And given the rows before it in its run, where neighbours may be correlated.
-
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        records: the rows.
-        columns: basis of the discrepancy at the rows, or None.
-        before: index of the row before each in its run, or None.
     """
     mean, noise = predict_rows(problem, values, records, columns)
     noise = with_rounding(noise, problem.step, rounded=problem.rounded)

@@ -108,10 +108,6 @@ def pilot_fit(records: Records, shapes: str = "bend") -> Pilot:
 
     By default generously, because too small a noise only chooses the exact likelihood
     of rounded readings, which is never wrong.
-
-    Args:
-        records: the rows.
-        shapes: as `base_model`.
     """
     base = base_model(records, shapes)
     residual = base.residual
@@ -138,10 +134,6 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     By more than a tenth over the range, which noise in proportion to the deformation
     can do there, with no sd of each row stated and no step of the reading wider than
     the noise. What a loop leaves at its turns is no noise.
-
-    Args:
-        case: records and gear.
-        pilot: fit of these records, where there is one.
     """
     records, pilot = case.records, pilot or pilot_fit(case.records)
     coarse = case.gear.force_resolution > pilot.noise_sd
@@ -177,10 +169,6 @@ def growth_p_value(square, deformation) -> float:
     """Return how rarely squared errors of one size grow so much with deformation.
 
     The test is that of Koenker, Journal of Econometrics 17 (1981).
-
-    Args:
-        square: of each row's error, shape (n,).
-        deformation: as read [mm], shape (n,).
     """
     far = np.abs(np.asarray(deformation))
     off, left = far - far.mean(), square - square.mean()

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from math import isnan, nan
 from typing import Any
 
 import numpy as np
@@ -125,17 +126,17 @@ def restore_priors(held: Mapping[str, Mapping]) -> dict[str, Prior]:
 
 def describe_case(case: Case) -> str:
     """Return a case without its rows as JSON."""
+    gear = asdict(case.gear)
+    sizes = gear["geometry"].items()
+    # Sizes of a spring are NaN, which is no number of JSON.
+    gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes}
     fields = {name: getattr(case, name) for name in _FIELDS}
     fields |= {"load": case.units.load, "known": sorted(case.records.known)}
-    return to_json({**fields, "gear": asdict(case.gear)})
+    return to_json({**fields, "gear": gear})
 
 
 def restore_case(text: str, tree: xr.DataTree) -> Case:
     """Return the case of a posterior.
-
-    Args:
-        text: from `describe_case`.
-        tree: groups with its rows.
 
     Raises:
         KeyError, TypeError, ValueError: text and rows do not describe a case.
@@ -144,7 +145,8 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     gear = fields["gear"]
     for table in (name for name in gear if name.endswith("priors")):
         gear[table] = restore_priors(gear[table])
-    gear["geometry"] = Geometry(**gear["geometry"])
+    sizes = gear["geometry"].items()
+    gear["geometry"] = Geometry(**{n: nan if v is None else v for n, v in sizes})
     gear["full_scale"] = FullScale(**gear["full_scale"])
     columns = group_of(tree, "constant_data")
     rows = {name: columns[name].values for name in COVARIATES}

@@ -148,9 +148,6 @@ def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
     """Return a warning for each fault of the noise, for answers that rest on it.
 
     A shape of the residuals is no such fault: what is predicted has a bend for it.
-
-    Args:
-        posterior: from `calibrate`.
     """
     words = [fault.words for fault in residuals(posterior).noise]
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))

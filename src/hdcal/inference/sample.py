@@ -227,14 +227,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 @jit
 def _constrain(problem, whitening, standard, seed):
-    """Return parameters by name, with draws of the members that were integrated out.
-
-    Args:
-        problem: the inference problem.
-        whitening: coordinates of the sampler.
-        standard: draws in these coordinates, (chain, draw, d).
-        seed: of the run.
-    """
+    """Return parameters by name, with draws of the members that were integrated out."""
     _, members = jax.random.split(jax.random.key(seed))
     chains, draws, _ = standard.shape
 

@@ -44,12 +44,7 @@ def whiten(columns, before, correlation):
 
 
 def log_volume(following, correlation) -> Float[Array, "*r"]:
-    """Return log |de/dz| at each ρ, by NumPy where that is no array of JAX.
-
-    Args:
-        following: number of rows that follow another one.
-        correlation: ρ.
-    """
+    """Return log |de/dz| at each ρ, by NumPy where that is no array of JAX."""
     xp = jnp if isinstance(correlation, jax.Array) else np
     return 0.5 * following * xp.log1p(-(correlation**2))
 

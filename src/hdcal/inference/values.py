@@ -108,14 +108,7 @@ def build_effects(problem: "Problem", values: Values) -> tuple[Effect, ...]:
 def predict_rows(
     problem: "Problem", values: Values, records: Records, columns
 ) -> tuple[Float[Array, " n"], Noise]:
-    """Return mean reading [N] and noise of rows of the tested runs and specimens.
-
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        records: the rows.
-        columns: basis of the discrepancy at the rows, or None.
-    """
+    """Return mean reading [N] and noise of rows of the tested runs and specimens."""
     base = member_base(problem, values, records.run, records.specimen)
     mean, noise = predict_reading(
         base, build_effects(problem, values), records, problem.reading
