@@ -54,18 +54,12 @@ def good():
 
 
 def run_of(**change) -> Draws:
-    nothing = np.zeros((CHAINS, DRAWS))
-    fields = {
-        "values": {},
+    statistics = {
         "energy": np.random.default_rng(0).normal(size=(CHAINS, DRAWS)),
-        "potential": nothing,
-        "diverging": nothing.astype(bool),
-        "n_steps": nothing + 7,
-        "acceptance": nothing,
-        "step_size": nothing,
-        "target_acceptance": 0.8,
+        "diverging": np.zeros((CHAINS, DRAWS), bool),
+        "n_steps": np.full((CHAINS, DRAWS), 7),
     }
-    return Draws(**(fields | change))
+    return Draws({}, statistics | change, 0.8)
 
 
 @pytest.mark.parametrize(

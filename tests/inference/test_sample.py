@@ -20,9 +20,10 @@ def sampler(monkeypatch):
         def advance(problem, whitening, state, target, *, warmup, length):
             done = state[0]
             at = np.arange(done, done + length) - warmup
-            kept = [np.zeros(length) for _ in range(7)]
-            kept[0] = at[:, None] * np.ones((length, 2))
-            kept[sample._DIVERGING] = at == diverging.get(target, -1)
+            nothing = dict.fromkeys(sample._STATISTICS, np.zeros(length))
+            kept = nothing | {"step_size": np.zeros(length)}
+            kept["standard"] = at[:, None] * np.ones((length, 2))
+            kept["diverging"] = at == diverging.get(target, -1)
             return [done + length], kept
 
         def constrain(problem, whitening, standard, seed):
@@ -56,14 +57,14 @@ def sampler(monkeypatch):
 def test_runs_are_extended_or_repeated(sampler, diverging, mixed, target, multiple):
     found = sampler(diverging, mixed)
     assert found.target_acceptance == target
-    assert found.energy.shape == (2, multiple * DRAWS)
+    assert found.shape == (2, multiple * DRAWS)
     np.testing.assert_array_equal(found.values["x"][1], np.arange(multiple * DRAWS))
-    assert found.diverging.sum() == (2 if target in diverging else 0)
+    assert found.statistics["diverging"].sum() == (2 if target in diverging else 0)
 
 
 def test_too_short_a_run_is_not_extended(sampler, monkeypatch):
     monkeypatch.setattr(sample, "_ENOUGH", 10)
-    assert sampler({}, []).energy.shape[1] == DRAWS
+    assert sampler({}, []).shape[1] == DRAWS
 
 
 @pytest.mark.thorough

@@ -89,7 +89,7 @@ def assemble(
     groups = {
         "posterior": dataset(values, units=units, labels=labels),
         "prior": dataset(prior_draws, units=units),
-        "sample_stats": dataset(_statistics(draws)),
+        "sample_stats": dataset(draws.statistics),
         **data_groups(case.records, observed, case.units),
         # The total has members integrated out, where they were.
         "log_likelihood": dataset(log_likelihood or {TOTAL: total}),
@@ -104,25 +104,12 @@ def assemble(
     return xr.DataTree.from_dict(groups), diagnoses, checks
 
 
-def _statistics(draws: Draws) -> dict[str, np.ndarray]:
-    """Return the statistics of the sampler under ArviZ' names, (chain, draw) each."""
-    return {
-        "energy": draws.energy,
-        "lp": -draws.potential,
-        "diverging": draws.diverging,
-        "n_steps": draws.n_steps,
-        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
-        "acceptance_rate": draws.acceptance,
-        "step_size": draws.step_size,
-    }
-
-
 def force_log_likelihood(
     case: Case, problem: Problem, draws: Draws
 ) -> dict[str, np.ndarray]:
     """Return the log likelihood of each row and draw; nothing if they are many."""
     rows = len(case.records.force)
-    if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
+    if np.prod(draws.shape) * rows > MOST_LOG_LIKELIHOODS:
         return {}
     padded = pad_records(case.records)
     columns = discrepancy_columns(problem.discrepancy, padded)
@@ -143,7 +130,7 @@ def _pointwise(problem, values, records, columns, before):
 def run_settings(draws: Draws, began: float) -> dict[str, object]:
     """Return the settings known after a run that began at a `time.perf_counter`."""
     return {
-        "draws": draws.energy.shape[1],
+        "draws": draws.shape[1],
         "target_acceptance": draws.target_acceptance,
         "versions": versions(),
         "seconds": round(time.perf_counter() - began, 3),

@@ -61,11 +61,12 @@ def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check,
 
     # NaN, which no check passes, where the energy stands still.
     with np.errstate(all="ignore"):
-        energy = np.asarray(array_stats.bfmi(draws.energy))
-    divergent = int(draws.diverging.sum())
-    saturated = float((draws.n_steps >= 2**MAX_TREE_DEPTH - 1).mean())
+        energy = np.asarray(array_stats.bfmi(draws.statistics["energy"]))
+    diverging, steps = draws.statistics["diverging"], draws.statistics["n_steps"]
+    divergent = int(diverging.sum())
+    saturated = float((steps >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
-        *mixing_checks(mixed, len(draws.energy)),
+        *mixing_checks(mixed, draws.shape[0]),
         _check(
             "energy is explored (BFMI)",
             bool(np.all(energy >= MIN_BFMI)),
@@ -74,7 +75,7 @@ def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check,
         _check(
             "no divergent trajectories",
             divergent == 0,
-            f"{divergent} of {draws.diverging.size} draws diverged, allowed 0",
+            f"{divergent} of {diverging.size} draws diverged, allowed 0",
         ),
         _check(
             "trajectories end by themselves (tree depth)",

@@ -22,7 +22,6 @@ from hdcal.physics.effect import parameters
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
-_MOST_MEMBERS = 200
 # A parameter that moves the mean by fewer noise sds over its whole prior has no effect.
 _NO_EFFECT = 1e-3
 
@@ -35,8 +34,7 @@ class Linearisation:
         sd: of the noise, rounding included [N], shape (n,).
         slopes: derivatives by parameter [N per unit of the parameter], shape (n,).
         members: contribution of each run, specimen and weight of the discrepancy per
-            prior sd [N], shape (n, m). Runs or specimens by the hundred are left out:
-            one of them matters little.
+            prior sd [N], shape (n, m).
         place: values of the members, in prior sds, shape (m,).
     """
 
@@ -78,7 +76,7 @@ def linearise(
         ("run", problem.runs, np.ones(rows)),
         ("specimen", problem.specimens, stiffening),
     ):
-        if 0 < count <= _MOST_MEMBERS:
+        if count:
             scale = values[MEMBER_SD[kind]]
             # Members are deviations from the mean of the tested ones.
             labelled = getattr(records, kind)[:, None] == np.arange(count)

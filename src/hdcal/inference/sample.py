@@ -33,9 +33,14 @@ _LONGEST = 4
 _ENOUGH = 8
 # Spread of the chains' starts in posterior sds, so that R-hat can detect disagreement.
 _OVERDISPERSION = 2.0
-# Fields of the sampler's state that are kept of each draw, `adapt_state` apart.
-_KEPT = ("z", "energy", "potential_energy", "diverging", "num_steps", "accept_prob")
-_DIVERGING = _KEPT.index("diverging")
+# Statistics that are kept of each draw: ArviZ' name, and that of the sampler's state.
+_STATISTICS = {
+    "energy": "energy",
+    "lp": "potential_energy",
+    "diverging": "diverging",
+    "n_steps": "num_steps",
+    "acceptance_rate": "accept_prob",
+}
 
 
 @dataclass(frozen=True)
@@ -44,23 +49,23 @@ class Draws:
 
     Attributes:
         values: by site name, in code units.
-        energy: Hamiltonian.
-        potential: −log posterior density in unconstrained coordinates.
-        diverging: whether the trajectory diverged.
-        n_steps: leapfrog steps of the trajectory.
-        acceptance: mean acceptance probability of the trajectory.
-        step_size: adapted to `target_acceptance`.
-        target_acceptance: mean acceptance that was aimed at.
+        statistics: of the sampler, under ArviZ' names.
+        target_acceptance: mean acceptance probability that was aimed at.
     """
 
     values: dict[str, np.ndarray]
-    energy: np.ndarray
-    potential: np.ndarray
-    diverging: np.ndarray
-    n_steps: np.ndarray
-    acceptance: np.ndarray
-    step_size: np.ndarray
+    statistics: dict[str, np.ndarray]
     target_acceptance: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of chains, and of draws of each."""
+        return self.statistics["energy"].shape
+
+    @property
+    def diverged(self) -> bool:
+        """Whether any trajectory diverged."""
+        return bool(self.statistics["diverging"].any())
 
     @cached_property
     def median(self) -> dict[str, np.ndarray]:
@@ -98,7 +103,7 @@ def sample(
     for target in longer:
         run = begin(target)
         run.advance(draws, stop_if_diverging=True)
-        if not run.diverged and not (found := _extended(run, draws)).diverging.any():
+        if not run.diverged and not (found := _extended(run, draws)).diverged:
             return found
     run = begin(shortest)
     run.advance(draws)
@@ -123,9 +128,8 @@ def _extended(run: "_Run", draws: int) -> Draws:
         found = run.draws()
         values = found.values.items()
         varying = {n: v for n, v in values if v.ndim == 2 and np.ptp(v) > 0.0}
-        length = found.energy.shape[1]
-        may_be_longer = _ENOUGH * ESS_PER_CHAIN <= length < _LONGEST * draws
-        if not may_be_longer or found.diverging.any() or have_mixed(varying):
+        may_be_longer = _ENOUGH * ESS_PER_CHAIN <= found.shape[1] < _LONGEST * draws
+        if not may_be_longer or found.diverged or have_mixed(varying):
             return found
         run.advance(draws)
 
@@ -163,7 +167,7 @@ class _Run:
             self._states = [state for state, _ in each]
             kept = jax.device_get([kept for _, kept in each])
             if self._done >= warmup:
-                self._kept.append([np.stack(part) for part in zip(*kept, strict=True)])
+                self._kept.append(jax.tree.map(lambda *parts: np.stack(parts), *kept))
             self._done += size["length"]
             if self._progress is not None:
                 self._progress(self._done, total)
@@ -173,14 +177,15 @@ class _Run:
     @property
     def diverged(self) -> bool:
         """Whether a trajectory of the last stretch diverged."""
-        return bool(self._kept) and bool(self._kept[-1][_DIVERGING].any())
+        return bool(self._kept) and bool(self._kept[-1]["diverging"].any())
 
     def draws(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
-        parts = zip(*self._kept, strict=True)
-        standard, *statistics = (np.concatenate(part, axis=1) for part in parts)
+        kept = jax.tree.map(lambda *parts: np.concatenate(parts, 1), *self._kept)
+        standard, kept["lp"] = kept.pop("standard"), -kept["lp"]
+        kept["tree_depth"] = np.ceil(np.log2(kept["n_steps"] + 1)).astype(int)
         named = jax.device_get(_constrain(*self._arguments, standard, self._seed))
-        return Draws(named, *statistics, target_acceptance=self._target)
+        return Draws(named, kept, self._target)
 
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
@@ -217,8 +222,9 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
     def one(state, _):
         state = step(state)
-        kept = [getattr(state, name) for name in _KEPT]
-        return state, [*kept, state.adapt_state.step_size]
+        kept = {name: getattr(state, its) for name, its in _STATISTICS.items()}
+        size = state.adapt_state.step_size
+        return state, {**kept, "standard": state.z, "step_size": size}
 
     state = jax.tree.unflatten(structure, leaves)
     state, kept = jax.lax.scan(one, state, length=length)

@@ -131,13 +131,13 @@ def _check_record(case: Case) -> None:
 
 def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> dict[str, Any]:
     """Return what the dynamic model adds to what every calibration has."""
-    place = np.unravel_index(np.argmin(sampled.potential), sampled.potential.shape)
+    place = np.unravel_index(np.argmax(sampled.statistics["lp"]), sampled.shape)
     best = {name: values[place] for name, values in sampled.values.items()}
     free = [name for name, prior in problem.priors.items() if prior.family != "fixed"]
     free = {name: best[name] for name in free if name != "deformation_sigma"}
     slopes, sd = _slopes(problem, best, free), best["deformation_sigma"]
     by_row = {}
-    if sampled.energy.size * problem.count <= MOST_LOG_LIKELIHOODS:
+    if np.prod(sampled.shape) * problem.count <= MOST_LOG_LIKELIHOODS:
         each = np.asarray(_pointwise(problem, sampled.values))
         by_row["deformation"] = each[..., : problem.count]
     return dict(
