@@ -151,7 +151,10 @@ def test_the_first_loading_is_taken_and_the_other_branch_is_not_predicted():
         hdcal.margin(posterior, 0.5, direction="down")
 
 
-@pytest.mark.parametrize(("options", "expected"), [([], 80.0), (["--range=all"], 62.7)])
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [([], 80.0), pytest.param(["--range=all"], 62.7, marks=pytest.mark.thorough)],
+)
 def test_calibrate_takes_the_straight_part_unless_all_is_asked_for(
     here: Hdcal, tmp_path: Path, options: list[str], expected: float
 ):

@@ -86,7 +86,7 @@ def test_what_bends_has_the_right_kernel_at_any_length(length):
 
 
 def test_the_gaps_prior_has_a_slope_everywhere():
-    slopes = jax.jacfwd(prior_sd, argnums=(0, 1))(1.0, 2.0)
+    slopes = jax.jit(jax.jacfwd(prior_sd, argnums=(0, 1)))(1.0, 2.0)
     assert np.isfinite(slopes).all()
 
 

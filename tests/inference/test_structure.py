@@ -80,6 +80,7 @@ def test_many_specimens_have_a_line_each():
     assert not decide_structure(many).with_gap
 
 
+@pytest.mark.thorough
 def test_a_posterior_keeps_its_structure():
     posterior = hdcal.calibrate(case(0.0, 0.7, 0), warmup=300, draws=100)
     assert posterior.structure == decide_structure(posterior.case)

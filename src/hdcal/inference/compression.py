@@ -62,10 +62,11 @@ def compress(
     """
     if np.ptp(records.force_sd) > 0.0:
         return None
-    labels = np.stack([records.run, records.specimen], axis=1)
-    distinct, group = np.unique(labels, axis=0, return_inverse=True)
-    table, size = np.column_stack([columns, records.force]), len(distinct)
-    group, alone, pairs = group.reshape(-1), np.full(len(table), True), None
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    labels = run + (run.max() + 1) * specimen
+    _, first, group = np.unique(labels, return_index=True, return_inverse=True)
+    table, size = np.column_stack([columns, records.force]), len(first)
+    alone, pairs = np.full(len(table), True), None
     if before is not None:
         alone = before < 0
         both = np.hstack([table[~alone], table[before[~alone]]])
@@ -73,8 +74,8 @@ def compress(
     return CompressedRows(
         factor=_factors(table[alone], group[alone], size),
         count=np.bincount(group, minlength=size).astype(float),
-        run=distinct[:, 0],
-        specimen=distinct[:, 1],
+        run=run[first],
+        specimen=specimen[first],
         known_sd=float(records.force_sd[0]),
         pairs=pairs,
         following=np.bincount(group[~alone], minlength=size).astype(float),

@@ -69,41 +69,37 @@ def linearise(
         for name in (*_MEAN, *(n for n in values if n.partition(".")[0] in of_mean))
         if name in values and problem.priors[name].family != "fixed"
     )
+    kinds = [kind for kind, site in MEMBERS.items() if site in values]
+    names += tuple(MEMBERS[kind] for kind in kinds)
     parts = _derivatives(problem, values, padded, columns, names=names)
-    sd, slopes, stiffening = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
+    sd, slopes = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
     members, place = [np.zeros((rows, 0))], [np.zeros(0)]
-    for kind, count, size in (
-        ("run", problem.runs, np.ones(rows)),
-        ("specimen", problem.specimens, stiffening),
-    ):
-        if count:
-            scale = values[MEMBER_SD[kind]]
+    for kind in kinds:
+        site = MEMBERS[kind]
+        if kind == "discrepancy" and problem.discrepancy is not None:
+            sizes = values["gap_sd"], values["gap_length"]
+            scale = np.asarray(problem.discrepancy.prior_sd(*sizes))
+            root = np.diag(scale)
+        else:
             # Members are deviations from the mean of the tested ones.
-            labelled = getattr(records, kind)[:, None] == np.arange(count)
-            members.append(scale * size[:, None] * (labelled - 1.0 / count))
-            place.append(values[MEMBERS[kind]] / scale)
-    if problem.discrepancy is not None and columns is not None:
-        sizes = values["gap_sd"], values["gap_length"]
-        scale = np.asarray(problem.discrepancy.prior_sd(*sizes))
-        members.append(columns[:rows] * scale)
-        place.append(values["gap_weights"] / scale)
+            scale, count = values[MEMBER_SD[kind]], len(values[site])
+            root = scale * (np.eye(count) - 1.0 / count)
+        members.append(slopes.pop(site) @ root)
+        place.append(values[site] / scale)
     sd = np.sqrt(sd**2 + problem.step**2 / 12.0)
     return Linearisation(sd, slopes, np.hstack(members), np.concatenate(place))
 
 
 @jit(static_argnames=("names",))
 def _derivatives(problem: Problem, values, records: Records, columns, *, names):
-    """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
+    """Return noise sd and derivatives of the mean reading by name."""
 
     def mean(part):
         mean, noise = predict_rows(problem, {**values, **part}, records, columns)
         return mean, noise.sd[0]
 
-    def stiffer(share):
-        return mean({"K": values["K"] * (1.0 + share)})[0]
-
     slopes, sd = jax.jacfwd(mean, has_aux=True)({name: values[name] for name in names})
-    return sd, slopes, jax.jvp(stiffer, (0.0,), (1.0,))[1]
+    return sd, slopes
 
 
 def resolved_units(
@@ -143,7 +139,7 @@ def resolved_units(
                 fixed = prior.family == "fixed"
                 values[name] = prior.numbers[0] if fixed else frozen(prior).median()
     padded, rows = pad_records(records), len(base_columns)
-    _, slopes, _ = _derivatives(problem, values, padded, None, names=tuple(widest))
+    _, slopes = _derivatives(problem, values, padded, None, names=tuple(widest))
     units = dict(widest)
     for name, most in widest.items():
         slope = np.asarray(slopes[name])[:rows]
