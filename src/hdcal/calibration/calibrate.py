@@ -44,7 +44,7 @@ _SHOWN = {
 }
 # The constant part is then about this share of what a pilot fit leaves.
 _PART, _PART_LOG_SD = 0.3, 0.7
-_PART_SOURCE = "a part of the noise that a pilot fit leaves, as it was seen to grow"
+_PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to grow"
 
 
 def choose_effects(
@@ -126,7 +126,7 @@ def calibrate(
         growth_check(found.values, unasked=grows),
     ]
     if not asked and with_gap is None:
-        # An effect, or a bend that was asked for, is a reason for another stiffness.
+        # An effect, or a requested bend, is a reason for another stiffness.
         checks += [
             line_check(records, stiffness, sized=theory != SPRING),
             straight_check(case, stiffness),

@@ -32,8 +32,8 @@ from hdcal.report.posterior_result import (
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]
-# Length of the secant as a share of the largest deformation: short beside what an
-# effect changes, and long beside the rounding of its corners.
+# Length of the secant as a share of the largest deformation: short compared with
+# what an effect changes, and long compared with the rounding of its corners.
 _SECANT = 0.02
 # Covariates whose absence leaves a question open.
 _WANTED = ("unloading", "specimen", "temperature")

@@ -40,7 +40,7 @@ def check_effect_priors(
 
     Raises:
         InputError: an effect or parameter is not in the library, the unit is of
-            another kind, or the spread belongs to the model's own members.
+            another kind, or the spread is that of members of the model.
     """
     known = {
         f"{name}.{field}": spec.unit

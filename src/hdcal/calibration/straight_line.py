@@ -73,8 +73,7 @@ def robust_line(records: Records) -> RobustLine | None:
 def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> "Check":
     """Fail a stiffness that is far from a robust straight line without a reason.
 
-    Also that of a part without sizes, whose stiffness the readings alone determine,
-    where they do not determine its sign.
+    Also that of a part without sizes where the readings do not determine its sign.
 
     Args:
         records: the rows.

@@ -29,7 +29,7 @@ _PRIOR_DRAWS = 2000
 # The log likelihood of every row and draw is not kept above this many numbers.
 MOST_LOG_LIKELIHOODS = 8_000_000
 TOTAL = "total"
-# Units of what follows from the parameters, and of what has no prior of its own.
+# Units of what follows from the parameters, and of members.
 _UNITS = {
     "stiffness": "N/mm",
     "damping": "N*s/mm",

@@ -120,7 +120,9 @@ def correlation_check(
         return Check(INDEPENDENT, "note", words)
     least, *ends, middle = np.quantile(draws[CORRELATION], [0.05, 0.025, 0.975, 0.5])
     if least < _REPORTED_CORRELATION:
-        return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
+        return Check(
+            INDEPENDENT, "passed", "the readings show no correlation of neighbours"
+        )
     span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
     # 1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|: the variance of a mean.
@@ -130,21 +132,21 @@ def correlation_check(
     return Check(
         INDEPENDENT,
         "warning",
-        f"{words}. Every interval allows for it, but these readings are worth some "
-        f"{effective:.0f} independent ones, and 95 % intervals hold the truth less "
-        "often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read longer, or "
-        "repeat",
+        f"{words}. Every interval allows for it, but these readings are equivalent to "
+        f"some {effective:.0f} independent ones, and 95 % intervals hold the truth "
+        "less often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read "
+        "longer or repeat",
     )
 
 
 def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
-    """Report noise that grows with the force, asked for or in the model unasked."""
+    """Report noise that grows with the force, on request or by the readings."""
     name = "readings scatter alike at any {load}"
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
     words = (
-        f"readings scatter by {np.median(share):.1%} of the {{load}}, beside σ at no "
+        f"readings scatter by {np.median(share):.1%} of the {{load}}, and by σ at no "
         "{load}; every interval allows for it"
     )
     if unasked:
@@ -192,7 +194,7 @@ def conflict_check(
     elif all("." in parameter for parameter in far):
         # A wrong unit shows in more than in parameters of effects.
         name = "prior and effects agree"
-        remedy = "Where the rig explains it, give it a prior of its own"
+        remedy = "Where the rig explains it, state a prior for it"
     else:
         name = PLAUSIBLE
         remedy = (

@@ -163,7 +163,7 @@ def identification_checks(
     length = {name: float(np.linalg.norm(column)) for name, column in scaled.items()}
     unseen = [name for name in scaled if length[name] < _NO_EFFECT]
     flat = [
-        f"{name} is hardly seen by this data; its prior is the answer"
+        f"{name} hardly changes the readings: its prior decides it"
         for name in scaled
         if _NO_EFFECT <= length[name] < 1.0
     ]
@@ -171,12 +171,19 @@ def identification_checks(
         words = "one combination of them can"
         if set(names) == {"K", "E0"}:
             words = "their product can, and with the prior of E0 that determines K"
-        flat.append(f"{listed(names)} cannot be told apart by this data; {words}")
-    seen, apart = "every parameter is seen by the data", "parameters can be told apart"
-    none = Check(seen, "passed", "each one moves the predicted readings")
+        flat.append(f"{listed(names)} cannot be distinguished by these data; {words}")
+    seen, apart = (
+        "every parameter changes the readings",
+        "parameters are distinguishable",
+    )
+    none = Check(seen, "passed", "each one changes the predicted readings")
     every = Check(apart, "passed", "no direction is left to the priors")
     unseen = [
-        Check(seen, "note", f"{name}: these data say nothing, the prior is the answer")
+        Check(
+            seen,
+            "note",
+            f"{name}: does not change these readings, the prior decides it",
+        )
         for name in unseen
     ]
     flat = [Check(apart, "note", sentence) for sentence in flat]

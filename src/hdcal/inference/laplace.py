@@ -79,7 +79,7 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     place, flat = _start(problem, dict(start or {}))
     flat = np.asarray(flat)
     hessian = np.asarray(_expand(problem, place, flat)[2])
-    # Parameters differ by many orders in scale: a trust region wants them alike.
+    # Parameters differ by many orders in scale: a trust region needs one scale.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 
     @lru_cache(maxsize=1)

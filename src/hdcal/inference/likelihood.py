@@ -112,7 +112,7 @@ def _(problem: Problem, values: Values) -> Float[Array, ""]:
 
 
 def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
-    """Return the log prior of the named parameters, each in its own coordinate."""
+    """Return the log prior of the named parameters, each in its native coordinate."""
     total = jnp.zeros(())
     for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":

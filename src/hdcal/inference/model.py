@@ -193,7 +193,7 @@ def _sample_deviations(name: str, sd, known_sd, count: int):
     """Sample the deviation of each tested member from the mean of the tested ones.
 
     Partially centred: scores are in posterior sds of a member, so that they are as wide
-    where members are alike as where they clearly differ. Either extreme is a funnel for
+    where members agree as where they clearly differ. Either extreme is a funnel for
     the other (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22, 2007).
 
     Args:

@@ -71,27 +71,29 @@ def base_model(records: Records, shapes: str = "line") -> Base:
             load.
     """
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
-    force, place = (
+    force, deformation = (
         np.asarray(values, float) for values in (records.force, records.deformation)
     )
-    size = np.abs(place) / (np.max(np.abs(place)) or 1.0)
-    place = (place - place.mean()) / (np.ptp(place) or 1.0)
+    scaled = deformation / (np.max(np.abs(deformation)) or 1.0)
+    place = (deformation - deformation.mean()) / (np.ptp(deformation) or 1.0)
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
     sense = np.asarray(records.sense, float)
     specimens, runs = np.unique(specimen), np.unique(run)
     columns, taken = [], 0
     if np.ptp(rise) > 0.0:
         # The modulus falls with the temperature; a drift of the zero is no part of it.
-        columns += [rise * np.asarray(records.deformation)]
+        columns += [rise * deformation]
     if shapes != "line":
         columns += [place**2, place**3, sense, rise]
     if shapes == "loop":
-        columns += [sense * size, sense * size**2, *loop_cells(records, _REACHES)]
+        loop = [sense * np.abs(scaled), sense * scaled**2]
+        columns += [*loop, *loop_cells(records, _REACHES)]
     if len(specimens) > _MOST_COLUMNS:
         *columns, force = (left_of_lines(records, one) for one in (*columns, force))
         taken = len(specimens) + len(runs)
     else:
-        columns += [place * (specimen == i) for i in specimens]
+        # Lines through the origin: several specimens in one run share a zero.
+        columns += [scaled * (specimen == i) for i in specimens]
         if len(runs) > _MOST_COLUMNS:
             *columns, force = (less_run_means(v, run) for v in (*columns, force))
             taken = len(runs)

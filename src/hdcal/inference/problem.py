@@ -169,7 +169,7 @@ def problem_priors(
     """Return the priors of every site, K carried over to the theory in use.
 
     Args:
-        case: gear with its own priors, which win.
+        case: gear, whose stated priors win.
         effects: in the model.
         shipped: priors of every effect in the library.
         theory: which stiffness K multiplies.
@@ -201,7 +201,7 @@ def influence_prior(case: Case, theory: Theory) -> Prior:
     """Return the prior of K carried over to a theory: K_a k_a = K_b k_b.
 
     Raises:
-        InputError: one of both is `spring`, whose modulus is another.
+        InputError: one theory is `spring`, which has another modulus.
     """
     gear = case.gear
     if (theory == SPRING) != (gear.K_theory == SPRING):

@@ -33,7 +33,7 @@ from hdcal.quantities import FORCE, Quantities
 
 NEIGHBOURS, SCATTER = "neighbours", "scatter"
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
-# posterior's own.
+# of the posterior.
 _DRAWS = 200
 # Fewer rows do not show the properties of their noise.
 _LEAST_ROWS = 12
@@ -150,9 +150,9 @@ def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
     A shape of the residuals is no such fault: what is predicted has a bend for it.
     """
     words = [fault.words for fault in residuals(posterior).noise]
-    alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    if alike.outcome == "warning":
-        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
+    correlation = correlation_check(posterior.draws, len(posterior.case.records.force))
+    if correlation.outcome == "warning":
+        words.append(f"{correlation.words[:1].upper()}{correlation.words[1:]}.")
     return tuple(words)
 
 
@@ -173,7 +173,7 @@ def noise_faults(
         records: the rows.
         sd: noise sd of each row [N].
         rounded: whether steps of the reading are wider than its noise; neighbours
-            are then alike without any correlation.
+            then err in the same way without any correlation.
         correlation: of neighbouring readings in the model [-].
     """
     if len(sd) < _LEAST_ROWS:

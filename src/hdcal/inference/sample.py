@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None]
 # Mean acceptance aimed at; each further value is for a run with divergences.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
-# A run is extended to at most so many times the draws that were asked for.
+# A run is extended to at most so many times the requested draws.
 _LONGEST = 4
 # Draws of a chain for each effective one that is needed; a shorter run is not extended.
 _ENOUGH = 8
@@ -157,7 +157,7 @@ class _Run:
         """
         warmup, total = self._warmup, max(self._done, self._warmup) + draws
         while self._done < total:
-            # Stretches end with the warm-up, so that all but the last ones are alike.
+            # Stretches end with the warm-up, for few lengths.
             left = (warmup if self._done < warmup else total) - self._done
             size = {"warmup": warmup, "length": min(_STRETCH, left)}
             each = [

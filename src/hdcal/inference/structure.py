@@ -1,4 +1,4 @@
-"""What the model of a case contains beside line and effects, decided once.
+"""What the model of a case contains besides line and effects, decided once.
 
 Two questions are answered before any sampling: are the errors of neighbouring readings
 correlated, and does the curve bend? Each answer is that of the evidence of the
@@ -50,7 +50,7 @@ _SIZES = np.logspace(-0.5, 3.0, 8)
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """Form of a model beside its effects.
+    """Form of a model apart from its effects.
 
     Attributes:
         noise_sd: left by a pilot fit [N].
@@ -148,15 +148,15 @@ def _best_form(
         return forms[0]
     records, priors = case.records, case.gear.scale_priors
     base = base_model(records, "bend" if with_effects else "line")
-    beside, scales = base.force[:, None], []
+    others, scales = base.force[:, None], []
     if any(gaps):
         gap = build_discrepancy(records)
         shapes = np.asarray(discrepancy_columns(gap, pad_records(records)))
-        beside = np.column_stack([shapes[: len(beside)], beside])
+        others = np.column_stack([shapes[: len(others)], others])
         lengths = _quantiles(priors["gap_length"], "gap_length", _LENGTHS)
         scales = [np.asarray(gap.prior_sd(1.0, one)) for one in lengths]
     columns = base.columns
-    table = np.hstack([columns, beside - columns @ (columns.T @ beside)])
+    table = np.hstack([columns, others - columns @ (columns.T @ others)])
     before, width = previous_rows(records), columns.shape[1]
     rho = _quantiles(priors[CORRELATION], CORRELATION, _CORRELATIONS)
 

@@ -88,7 +88,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
 
     tables = {"name": Path(folder).resolve().name, **stated}
     if str(tables["material"]).endswith(".toml"):
-        # A gear file names another file as seen from its own folder.
+        # A gear file names another file relative to its folder.
         tables["material"] = os.path.abspath(str(tables["material"]))
     case = None
     with console.wrong:
