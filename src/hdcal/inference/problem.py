@@ -14,7 +14,7 @@ from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records, lies_far
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.exported import jit
 from hdcal.inference.compression import CompressedRows, compress
 from hdcal.inference.discrepancy import (
@@ -124,13 +124,8 @@ class Problem(Sampled):
 
     @property
     def rows(self) -> Records:
-        """The kept rows, padded.
-
-        Raises:
-            ValueError: they were compressed.
-        """
-        if self.records is None:
-            raise ValueError("the rows of this problem are compressed")
+        """The kept rows, padded."""
+        assert self.records is not None, "the rows of this problem are compressed"
         return self.records
 
 
@@ -149,15 +144,6 @@ def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]
     members of the model, with the priors `run_offset_sd` and `specimen_sd`.
     """
     return tuple(effect for effect in effects if not issubclass(effect, Scatter))
-
-
-def effect_sites(effects: Sequence[type[Effect]]) -> list[str]:
-    """Return the names of the parameters of effects."""
-    return [
-        f"{effect.name}.{field}"
-        for effect in without_scatter(effects)
-        for field in parameters(effect)
-    ]
 
 
 def problem_priors(
@@ -180,7 +166,9 @@ def problem_priors(
     gear = case.gear
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
     table |= gear.gauge_priors
-    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors, *effect_sites(effects)]
+    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors]
+    for effect in without_scatter(effects):
+        names += [f"{effect.name}.{field}" for field in parameters(effect)]
     missing = [name for name in names if name not in table]
     if missing:
         raise InputError(
@@ -237,17 +225,16 @@ def build_problem(
     Raises:
         InputError: an effect lacks its covariates or a prior.
     """
-    check_covariates(case, effects)
-    effects, theory = without_scatter(effects), theory or case.gear.theory
-    priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
-    form = structure or decide_structure(case, effects)
     members = {
         kind: len(getattr(case, f"{kind}_labels"))
         for kind in MEMBER_SD
         if kind in records.known
     }
-    _check_members(case.name, members)
+    _check(case, effects, members)
+    effects, theory = without_scatter(effects), theory or case.gear.theory
+    priors = problem_priors(case, effects, shipped, theory)
+    form = structure or decide_structure(case, effects)
     padded, rows = pad_records(records), len(records.force)
     leftover = build_discrepancy(records, effects) if form.with_gap else None
     base = np.asarray(_base_columns(padded, reading))[:rows]
@@ -294,33 +281,21 @@ def build_problem(
     return replace(problem, units=units)
 
 
-def _check_members(name: str, members: Mapping[str, int]) -> None:
-    """Raise `InputError` where runs or specimens are too many."""
-    if findings := [
-        Finding(
-            name,
-            f"{count} {kind}s are too many for one calibration",
-            f"Give it {_MOST_MEMBERS} or fewer; the command fleet takes any number",
-        )
-        for kind, count in members.items()
-        if count > _MOST_MEMBERS
-    ]:
-        raise InputError(findings)
-
-
-def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
-    """Raise `InputError` where the data lack a covariate that an effect needs."""
-    findings = [
-        Finding(
-            case.name,
-            f"effect '{effect.name}' needs {need}, which these data do not have",
-            "measure it, or leave the effect out",
-        )
-        for effect in effects
-        for need in sorted(effect.needs - case.records.known)
-    ]
-    if findings:
-        raise InputError(findings)
+def _check(
+    case: Case, effects: Sequence[type[Effect]], members: Mapping[str, int]
+) -> None:
+    """Raise `InputError` where covariates are missing, or members are too many."""
+    with Findings() as findings:
+        for effect in effects:
+            for need in sorted(effect.needs - case.records.known):
+                words = f"effect '{effect.name}' needs {need}, which these data lack"
+                remedy = "measure it, or leave the effect out"
+                findings.append(Finding(case.name, words, remedy))
+        for kind, count in members.items():
+            if count > _MOST_MEMBERS:
+                words = f"{count} {kind}s are too many for one calibration"
+                remedy = f"give it {_MOST_MEMBERS} or fewer; fleet takes any number"
+                findings.append(Finding(case.name, words, remedy))
 
 
 def case_reading(case: Case) -> Reading:

@@ -18,7 +18,7 @@ from hdcal.inference.discrepancy import (
     discrepancy_columns,
 )
 from hdcal.inference.distributions import frozen
-from hdcal.inference.noise_form import Pilot, base_model, pilot_fit
+from hdcal.inference.noise_form import Base, Pilot, base_model, pilot_fit
 from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import (
     CORRELATION,
@@ -83,6 +83,7 @@ def decide_structure(
         pilot: fit of these records, where there is one.
     """
     noise_sd = (pilot or pilot_fit(case.records)).noise_sd
+    base = base_model(case.records, "bend" if effects else "line")
     # What the gear file states of the correlation is in the model.
     is_stated = case.gear.scale_priors[CORRELATION].family != "uniform"
 
@@ -92,27 +93,26 @@ def decide_structure(
 
     rounded = _needs_exact_rounding(case, effects, noise_sd, bool(with_gap))
     reason, choices = considered(rounded)
-    if with_gap is None and (effects or not _may_bend(case)):
+    if with_gap is None and (effects or not _may_bend(case, base)):
         with_gap = False
     gaps = _EITHER if with_gap is None else (with_gap,)
-    gap, correlated = _best_form(case, bool(effects), gaps, choices)
+    gap, correlated = _best_form(case, base, gaps, choices)
     coarse = _needs_exact_rounding(case, effects, noise_sd, gap)
     if coarse != rounded:
         # With a leftover the steps are taken for noise, which may be correlated.
         rounded = coarse
         reason, choices = considered(rounded)
-        gap, correlated = _best_form(case, bool(effects), (gap,), choices)
+        gap, correlated = _best_form(case, base, (gap,), choices)
     if not (reason or correlated):
         reason = NONE_SHOWN
     return ModelStructure(noise_sd, rounded, gap, correlated, reason)
 
 
-def _may_bend(case: Case) -> bool:
+def _may_bend(case: Case, base: Base) -> bool:
     """Return whether rows are enough, and a line misses one by more than its step."""
     if len(case.records.force) < _LEAST_ROWS_OF_A_GAP:
         return False
-    residual = base_model(case.records).residual
-    return float(np.max(np.abs(residual))) > case.gear.force_resolution
+    return float(np.max(np.abs(base.residual))) > case.gear.force_resolution
 
 
 def _needs_exact_rounding(case: Case, effects, noise_sd: float, with_gap: bool) -> bool:
@@ -140,14 +140,13 @@ def _why_independent(case: Case, effects, rounded: bool) -> str:
 
 
 def _best_form(
-    case: Case, with_effects: bool, gaps: tuple[bool, ...], choices: tuple[bool, ...]
+    case: Case, base: Base, gaps: tuple[bool, ...], choices: tuple[bool, ...]
 ) -> tuple[bool, bool]:
     """Return whether there is a leftover and a correlation, of those considered."""
     forms = [(gap, correlated) for gap in gaps for correlated in choices]
     if len(forms) == 1:
         return forms[0]
     records, priors = case.records, case.gear.scale_priors
-    base = base_model(records, "bend" if with_effects else "line")
     others, scales = base.force[:, None], []
     if any(gaps):
         gap = build_discrepancy(records)
