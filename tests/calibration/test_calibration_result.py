@@ -6,20 +6,24 @@ import numpy as np
 import pytest
 from posteriors import (
     batch,
+    beside,
     plain_draws,
     ramp_case,
     regressed,
     single,
+    spring,
     with_leftover,
     written_posterior,
 )
 from rigs import cycles, make_case, make_gear
 
-from hdcal.calibration.calibration import Calibration, calibration_of
+from hdcal.calibration.calibration import (
+    Calibration,
+    calibration_of,
+    tangent_stiffness,
+)
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import PLAUSIBLE, Check
-from hdcal.prediction.bands.charts import bands_chart
-from hdcal.prediction.bands.result import COLUMNS
 from hdcal.report.chart_spec import Band, Line, Points
 
 X = np.linspace(0.02, 0.54, 60)
@@ -152,17 +156,37 @@ def test_in_tension_the_falling_branch_is_that_of_loading():
     assert lines["median"] == "solid" and lines["median, unloading"] == "dashed"
 
 
-def test_each_temperature_has_a_panel_and_untested_parts_are_hatched():
-    bands = calibration_of(single()).bands
-    warm = bands.model_copy(update={"temperature_C": bands.temperature_C + 30.0})
-    both = {
-        name: np.concatenate([getattr(bands, name), getattr(warm, name)])
-        for name in (*COLUMNS, "straight_N")
-    }
-    marks = bands_chart(bands.model_copy(update=both)).panels[0].marks
-    medians = [m for m in marks if isinstance(m, Line) and m.dash == "solid"]
-    assert [m.label[:9] for m in medians] == ["median at"] * 2
-    assert medians[0].colour != medians[1].colour
-    hatched = [mark for mark in marks if isinstance(mark, Band) and mark.hatched]
-    shown = np.isfinite(hatched[0].low)
-    assert shown[-1] and not shown[np.argmin(np.abs(hatched[0].x - 0.3))]
+def test_a_spring_has_no_theories_and_its_K_is_the_stiffness():
+    posterior = spring()
+    found = calibration_of(posterior)
+    assert found.K_by_theory == dict.fromkeys(("ring", "cup", "article"))
+    assert found.parameters["K"].unit == "N/mm" and not found.theories
+    assert "E0" in found.parameters and "E0" not in found.measured
+    page = found.page()
+    assert "K under each theory" not in page and ">nan<" not in page
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "factor"),
+    [
+        ("contact_onset", {"ratio": 3.0, "onset": 0.2}, 4.0),
+        ("progressive_stiffening", {"slope": 0.4}, 1.0 + 2.0 * 0.4 * 0.495),
+        ("seating_slack", {"clearance": 0.05}, 1.0),
+    ],
+)
+def test_the_stiffness_at_the_end_has_the_effect_in_it(effect, values, factor):
+    rng, x = np.random.default_rng(1), np.linspace(0.02, 0.5, 25)
+    others = {f"{effect}__{name}": value for name, value in values.items()}
+    force = 100.0 * x + rng.normal(0.0, 0.2, len(x))
+    posterior = regressed(x, force, rng, effects=(effect,), **others)
+    found = tangent_stiffness(posterior)
+    assert found is not None and found.at_mm == 0.5
+    straight = np.quantile(posterior.draws["stiffness"], [0.025, 0.5, 0.975])
+    one = found.stiffness_N_per_mm
+    assert (one.lo, one.median, one.hi) == pytest.approx(factor * straight, rel=2e-3)
+
+
+@pytest.mark.parametrize("posterior", [single(size=20), None])
+def test_no_tangent_without_an_effect_that_changes_the_stiffness(posterior):
+    posterior = posterior or beside(single(size=20), "thermal_zero_drift")
+    assert tangent_stiffness(posterior) is None

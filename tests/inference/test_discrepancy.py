@@ -43,18 +43,19 @@ def test_the_gap_takes_no_offset_and_no_slope(loading, tested):
     np.testing.assert_allclose(line.T @ basis / norms, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["coulomb_friction", "hysteresis", "viscous_damping"])
-def test_beside_an_effect_that_draws_loops_the_gap_has_none(loading, name):
+@pytest.mark.parametrize(
+    ("name", "looped"),
+    [("coulomb_friction", False), ("hysteresis", False), ("thermal_zero_drift", True)],
+)
+def test_with_an_effect_that_draws_loops_the_gap_has_none(loading, name, looped):
     """Else the effect's size would be the leftover's to choose."""
     gap = build_discrepancy(loading, [EFFECTS[name]])
     place, up = np.linspace(0.02, 0.54, 9), np.ones(9)
-    columns = [np.asarray(gap.columns(place, way * up)) for way in (1.0, -1.0)]
-    np.testing.assert_array_equal(*columns)
-    other = build_discrepancy(loading, [EFFECTS["thermal_zero_drift"]])
-    columns = [np.asarray(other.columns(place, way * up)) for way in (1.0, -1.0)]
-    assert np.max(np.abs(columns[0] - columns[1])) > 0.1
-    # A mixture holds draws of both models in one table.
-    assert gap.size == other.size
+    rising, falling = (np.asarray(gap.columns(place, way * up)) for way in (1.0, -1.0))
+    assert gap.looped == looped
+    assert (np.max(np.abs(rising - falling)) > 0.1) == looped
+    # Draws of several models are joined in one table.
+    assert gap.size == build_discrepancy(loading).size
 
 
 def kernel_error(length, project):
@@ -72,20 +73,20 @@ def kernel_error(length, project):
     return np.max(np.abs(off @ (approximate - exact) @ off)) / sd**2
 
 
-@pytest.mark.parametrize("length", [0.1, 0.15, 0.2, 0.3])
+@pytest.mark.parametrize("length", [0.1, 0.3])
 def test_the_gap_has_a_squared_exponential_kernel(length):
     # The boundary at two half-ranges is right up to 2/3.2 half-ranges, 0.31.
     assert kernel_error(length, project=0.0) < 5e-3
 
 
-@pytest.mark.parametrize("length", [0.1, 0.3, 0.6, 1.0, 2.0])
+@pytest.mark.parametrize("length", [0.1, 0.6, 2.0])
 def test_what_bends_has_the_right_kernel_at_any_length(length):
     # Beyond that the missing part is nearly straight, which the base explains anyway.
     assert kernel_error(length, project=1.0) < 2e-2
 
 
 def test_the_gaps_prior_has_a_slope_everywhere():
-    slopes = jax.jacfwd(prior_sd, argnums=(0, 1))(1.0, 2.0)
+    slopes = jax.jit(jax.jacfwd(prior_sd, argnums=(0, 1)))(1.0, 2.0)
     assert np.isfinite(slopes).all()
 
 

@@ -1,51 +1,125 @@
-"""Rows are padded to few lengths, and what is padded is as before where it was."""
+"""Rows are padded to few lengths, and padding counts for nothing."""
 
+from dataclasses import replace
+
+import jax
 import numpy as np
 import pytest
+from moving import moving_case
+from rigs import draw_truth, make_case, make_gear
+from scipy import stats
+from structures import form_of
 
-from hdcal.inference.padding import (
-    append_zeros,
-    bucket_size,
-    measured,
-    repeat_last_row,
+from hdcal.data.priors import effect_priors
+from hdcal.inference.identifiability import linearise
+from hdcal.inference.likelihood import log_likelihood
+from hdcal.inference.padding import bucket_size, measured, repeat_last_row
+from hdcal.inference.problem import build_problem
+from hdcal.motion.dynamic_problem import (
+    build_dynamic,
+    dynamic_site_priors,
+    predict_motion,
 )
 
 
-def test_few_lengths_hold_every_number_of_rows() -> None:
-    sizes = [bucket_size(rows) for rows in range(1, 3000)]
-    assert all(size >= rows for rows, size in enumerate(sizes, start=1))
-    assert all(size < 1.5 * rows for rows, size in enumerate(sizes, 1) if rows > 16)
-    assert sorted(set(sizes)) == sizes_up_to(3072)
-    assert bucket_size(0) == 16
-    assert bucket_size(1_000_000) == 2**20
-
-
-def sizes_up_to(largest: int) -> list[int]:
+def test_few_lengths_hold_every_number_of_rows():
+    sizes = [bucket_size(rows) for rows in range(3000)]
     powers = [2**k for k in range(4, 13)]
-    every = sorted([*powers, *(3 * power // 2 for power in powers)])
-    return [size for size in every if size <= largest]
+    lengths = sorted([*powers, *(3 * power // 2 for power in powers)])
+    assert sorted({*sizes}) == [size for size in lengths if size <= 3072]
+    assert all(rows <= size for rows, size in enumerate(sizes))
+    assert all(size < 1.5 * rows for rows, size in enumerate(sizes) if rows > 16)
 
 
-def test_a_length_of_a_bucket_is_its_own() -> None:
-    for size in sizes_up_to(5000):
-        assert bucket_size(size) == size
-
-
-@pytest.mark.parametrize("pad", [repeat_last_row, append_zeros])
-def test_measured_rows_stay_and_the_others_are_told_apart(pad) -> None:
-    tree = {"a": np.arange(5.0), "b": np.arange(10).reshape(5, 2), "c": np.ones(5, int)}
-    padded = pad(tree, 16)
-    real = np.asarray(measured(16, 5))
-    assert real.sum() == 5
+def test_the_last_row_is_repeated_and_not_measured():
+    tree = {"a": np.arange(5.0), "b": np.arange(10).reshape(5, 2)}
+    padded, real = repeat_last_row(tree, 16), np.asarray(measured(16, 5))
     for name, array in tree.items():
         assert padded[name].dtype == array.dtype
-        assert padded[name].shape == (16, *array.shape[1:])
         np.testing.assert_array_equal(padded[name][real], array)
-        rest = array[-1:] if pad is repeat_last_row else np.zeros_like(array[:1])
-        np.testing.assert_array_equal(padded[name][~real], np.repeat(rest, 11, axis=0))
+        np.testing.assert_array_equal(padded[name][~real], [array[-1]] * 11)
 
 
-def test_a_full_bucket_is_left_as_it_is() -> None:
-    rows = np.arange(24.0)
-    np.testing.assert_array_equal(append_zeros(rows, 24), rows)
-    np.testing.assert_array_equal(repeat_last_row(rows, 24), rows)
+@pytest.fixture(scope="module")
+def rounded(loading):
+    """Rows with runs and a leftover that are sampled, their problem and a draw."""
+    rng, rows = np.random.default_rng(4), len(loading.force)
+    records = replace(
+        loading,
+        force=np.round(200.0 * loading.deformation + rng.normal(0.0, 0.6, rows)),
+        run=np.arange(rows) * 7 % 4,
+        known=frozenset({"run", "temperature"}),
+    )
+    case = make_case(records, make_gear(resolution=1.0))
+    form = replace(form_of(case, (), True), rounded=True, correlated=False)
+    problem = build_problem(case, effect_priors(), structure=form)
+    values = draw_truth(problem, jax.random.key(0))
+    stiffness = 200.0 / (values["E0"] * problem.unit_stiffness)
+    values |= {"K": stiffness, "sigma": np.float64(0.7), "alpha": np.float64(3e-4)}
+    values |= {"force_offset": np.float64(0.3), "deformation_offset": np.float64(1e-3)}
+    values |= {"run_offset": rng.normal(0.0, 1.0, 4)}
+    values |= {"gap_weights": rng.normal(0.0, 0.3, problem.discrepancy.size)}
+    return case, problem, values
+
+
+def mean_of(case, problem, values) -> np.ndarray:
+    records, gap = case.records, problem.discrepancy
+    slope = values["K"] * values["E0"] * problem.unit_stiffness
+    slope = slope * (1.0 - values["alpha"] * (records.temperature - 20.0))
+    mean = slope * (records.deformation - values["deformation_offset"])
+    mean = mean + values["force_offset"] + values["run_offset"][records.run]
+    columns = np.asarray(gap.columns(records.deformation, records.sense))
+    return mean + columns @ values["gap_weights"]
+
+
+def test_the_likelihood_of_rounded_rows_is_that_of_the_measured_ones(rounded):
+    case, problem, values = rounded
+    assert len(problem.rows.force) > problem.count == len(case.records.force)
+    error = case.records.force - mean_of(*rounded)
+    # The difference of the smaller tails is the more exact one.
+    low, high = (error - 0.5) / 0.7, (error + 0.5) / 0.7
+    chance = np.where(
+        error < 0.0,
+        stats.norm.cdf(high) - stats.norm.cdf(low),
+        stats.norm.sf(low) - stats.norm.sf(high),
+    )
+    found = float(jax.jit(log_likelihood)(problem, values))
+    assert found == pytest.approx(np.log(chance).sum(), rel=1e-7)
+
+
+def test_derivatives_are_those_of_the_measured_rows(rounded):
+    case, problem, values = rounded
+    found = linearise(problem, values, case.records)
+    np.testing.assert_allclose(found.sd, np.hypot(0.7, 1.0 / np.sqrt(12.0)))
+    for name in ("K", "E0", "alpha", "force_offset", "deformation_offset"):
+        step = 1e-4 * abs(values[name])
+        high, low = (
+            mean_of(case, problem, values | {name: values[name] + move})
+            for move in (step, -step)
+        )
+        slope = (high - low) / (2.0 * step)
+        np.testing.assert_allclose(found.slopes[name], slope, rtol=1e-6, atol=1e-6)
+    share = (np.asarray(case.records.run)[:, None] == np.arange(4)) - 0.25
+    np.testing.assert_allclose(found.members[:, :4], values["run_offset_sd"] * share)
+    np.testing.assert_allclose(
+        found.place[:4], values["run_offset"] / values["run_offset_sd"]
+    )
+
+
+def test_a_moving_gear_padded_is_as_measured():
+    rows = 201
+    case = moving_case(0, rows=rows)
+    problem = build_dynamic(case, dynamic_site_priors(case, "ring"), "ring")
+    assert len(problem.time) == bucket_size(rows) > rows
+    cut = replace(
+        problem,
+        time=problem.time[:rows],
+        force=problem.force[:rows],
+        deformation=problem.deformation[:rows],
+    )
+    values = draw_truth(problem, jax.random.key(3))
+    move, density = jax.jit(predict_motion), jax.jit(log_likelihood)
+    motions = [np.asarray(move(one, values))[:rows] for one in (problem, cut)]
+    np.testing.assert_allclose(*motions, rtol=0, atol=1e-12)
+    densities = [float(density(one, values)) for one in (problem, cut)]
+    np.testing.assert_allclose(*densities, rtol=1e-11)

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from hdcal.calibration.known_effects import check_effect_priors, check_names
-from hdcal.calibration.straight_part import straight_check
+from hdcal.calibration.straight_line import line_check, straight_check
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
@@ -15,12 +15,7 @@ from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.assembly import (
-    Specifics,
-    assemble,
-    force_log_likelihood,
-    run_settings,
-)
+from hdcal.inference.assembly import assemble, force_log_likelihood, run_settings
 from hdcal.inference.checks import (
     Check,
     correlation_check,
@@ -28,13 +23,11 @@ from hdcal.inference.checks import (
     rounding_check,
 )
 from hdcal.inference.identifiability import linearise
-from hdcal.inference.members import MEMBERS
 from hdcal.inference.noise_form import noise_grows, pilot_fit
 from hdcal.inference.posterior import STRUCTURE, Posterior
-from hdcal.inference.problem import Problem, build_problem, problem_priors
+from hdcal.inference.problem import MEMBERS, Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
-from hdcal.inference.straight_line import line_check
-from hdcal.inference.structure import ModelStructure, decide_structure
+from hdcal.inference.structure import decide_structure
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.physics.registry import EFFECTS
@@ -51,7 +44,7 @@ _SHOWN = {
 }
 # The constant part is then about this share of what a pilot fit leaves.
 _PART, _PART_LOG_SD = 0.3, 0.7
-_PART_SOURCE = "a part of the noise that a pilot fit leaves, as it was seen to grow"
+_PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to grow"
 
 
 def choose_effects(
@@ -114,29 +107,44 @@ def calibrate(
     check_settings(chains, warmup, draws, seed)
     asked, pilot = choose_effects(effects, registry), pilot_fit(case.records)
     check_effect_priors(case, registry)
-    # Readings may show that noise grows, though nobody asked for it.
-    shown = adapt_noise and _may_grow(case, asked) and noise_grows(case, pilot)
-    chosen = (*asked, HeteroscedasticNoise) if shown else asked
-    case = _with_constant_part(case, pilot.noise_sd) if shown else case
+    chosen, shipped = asked, effect_priors(case.gear.full_scale)
+    grows = adapt_noise and _may_grow(case, asked) and noise_grows(case, pilot)
+    if grows:
+        chosen, shipped = (*asked, HeteroscedasticNoise), shipped | _SHOWN
+        case = _with_constant_part(case, pilot.noise_sd)
     form = decide_structure(case, asked, with_gap, pilot)
-    shipped = effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
     theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, structure=form)
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    fitted = laplace.fit(problem)
-    found = sample(problem, fitted, seed, progress=progress, **size)
-    # An effect, or a bend that was asked for, is a reason for another stiffness.
-    plain = not asked and with_gap is None
-    own = _specifics(case, theory, problem, form, found, plain=plain, shown=shown)
-    parts = assemble(case, priors, problem, found, own, seed)
+    found = sample(problem, laplace.fit(problem), seed, progress=progress, **size)
+    stiffness, records = found.values["stiffness"], case.records
+    checks = [
+        rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
+        correlation_check(found.values, len(records.force), form.why_independent),
+        growth_check(found.values, unasked=grows),
+    ]
+    if not asked and with_gap is None:
+        # An effect, or a requested bend, is a reason for another stiffness.
+        checks += [
+            line_check(records, stiffness, sized=theory != SPRING),
+            straight_check(case, stiffness),
+        ]
+    parts = assemble(
+        case,
+        priors,
+        problem,
+        found,
+        seed=seed,
+        log_likelihood=force_log_likelihood(case, problem, found),
+        sensitivities=linearise(problem, found.median, records).sensitivities(),
+        mixed=_other_quantities(problem, found),
+        checks=_in_units(case, checks),
+    )
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
     settings |= {STRUCTURE: asdict(form)} | run_settings(found, began)
-    posterior = Posterior(case, theory, chosen, priors, *parts, settings)
-    # A million rows are not compressed anew.
-    vars(posterior)["problem"] = problem
-    return posterior
+    return Posterior(case, theory, chosen, priors, *parts, settings)
 
 
 def _may_grow(case: Case, effects: Sequence[type[Effect]]) -> bool:
@@ -159,38 +167,7 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
-def _specifics(
-    case: Case,
-    theory: Theory,
-    problem: Problem,
-    form: ModelStructure,
-    found: Draws,
-    *,
-    plain: bool,
-    shown: bool,
-) -> Specifics:
-    """Return what the model of the force adds to what every calibration has."""
-    sigma, rows = found.values["sigma"], len(case.records.force)
-    line_checks = []
-    if plain:
-        stiffness = found.values["stiffness"]
-        line_checks += [line_check(case.records, stiffness, sized=theory != SPRING)]
-        line_checks += [straight_check(case, stiffness)]
-    return Specifics(
-        log_likelihood=force_log_likelihood(case, problem, found),
-        sensitivities=linearise(problem, found.median, case.records).sensitivities(),
-        mixed=_other_quantities(problem, found),
-        checks=_said(
-            case,
-            rounding_check(float(problem.step), problem.rounded, sigma),
-            correlation_check(found.values, rows, form.why_independent),
-            growth_check(found.values, unasked=shown),
-            *line_checks,
-        ),
-    )
-
-
-def _said(case: Case, *checks: Check) -> list[Check]:
+def _in_units(case: Case, checks: Sequence[Check]) -> list[Check]:
     """Return checks whose words name what was measured."""
     say = case.units.say
     return [replace(one, name=say(one.name), words=say(one.words)) for one in checks]

@@ -4,20 +4,22 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Literal, get_args
 
+import jax
+import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.charts import calibration_chart, residual_chart
 from hdcal.calibration.residual_report import ResidualShape, residual_shapes
-from hdcal.calibration.tangent import tangent_stiffness
 from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residual_noise import WILD
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.predict import default_bands
 from hdcal.prediction.bands.result import Bands
+from hdcal.prediction.forces import force_of, grid_records
 from hdcal.report.chart_spec import Chart
 from hdcal.report.draws_charts import prior_chart, rank_chart
 from hdcal.report.item import Interval, Item, Words, quantity
@@ -30,6 +32,9 @@ from hdcal.report.posterior_result import (
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]
+# Length of the secant as a share of the largest deformation: short compared with
+# what an effect changes, and long compared with the rounding of its corners.
+_SECANT = 0.02
 # Covariates whose absence leaves a question open.
 _WANTED = ("unloading", "specimen", "temperature")
 
@@ -159,7 +164,7 @@ def calibration_of(posterior: Posterior) -> Calibration:
         K_by_theory=K_by_theory(posterior),
         residuals=shapes,
         effects=tuple(effect.name for effect in posterior.effects),
-        tangent=_tangent(posterior),
+        tangent=tangent_stiffness(posterior),
         with_gap=bool(posterior.settings["with_gap"]),
         specimens=_specimens(posterior),
         steps=tuple(dict.fromkeys(_steps(posterior, left))),
@@ -167,10 +172,32 @@ def calibration_of(posterior: Posterior) -> Calibration:
     )
 
 
-def _tangent(posterior: Posterior) -> Tangent | None:
-    if (found := tangent_stiffness(posterior)) is None:
+def tangent_stiffness(posterior: Posterior) -> Tangent | None:
+    """Return the stiffness at the largest tested deformation, effects included.
+
+    K and the stiffness of the straight model leave effects out: behind the onset of a
+    second contact a gear is stiffer. None where the model has no effect that changes
+    the stiffness at once.
+    """
+    acting = [e for e in posterior.effects if e.stage in ("deformation", "force")]
+    if not any(effect.instantaneous for effect in acting):
         return None
-    return Tangent(at_mm=found[0], stiffness_N_per_mm=found[1])
+    case = posterior.case
+    deformation = np.asarray(case.records.deformation)
+    largest = float(deformation[np.argmax(np.abs(deformation))])
+    before = (1.0 - _SECANT) * largest
+    warm = np.full(2, case.gear.reference_temperature)
+    rows = grid_records(np.array([before, largest]), warm, np.ones(2), 0.0)
+    forces = np.asarray(_loads(posterior.problem, posterior.draws, rows))
+    slopes = np.diff(forces, axis=1)[:, 0] / (largest - before)
+    return Tangent(at_mm=largest, stiffness_N_per_mm=Interval.of(slopes))
+
+
+@jit
+def _loads(problem, values, rows):
+    return jax.vmap(lambda one: force_of(problem, one, rows, quantity="load")[0])(
+        values
+    )
 
 
 def summarise(posterior: Posterior) -> dict:
@@ -222,17 +249,14 @@ def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
         return
     known = posterior.case.records.known
     warned = {check.name for check in posterior.checks if check.outcome == "warning"}
-    noise = [shape.name for shape in left.noise]
     if PLAUSIBLE in warned:
         yield "implausible"
-    if WILD in noise:
-        yield WILD
     if "specimens" in known:
         yield "several specimens"
     if INDEPENDENT in warned and "unloading" in known:
         yield "strong correlation"
     yield from (shape.name for shape in left.structure)
-    yield from noise
+    yield from (shape.name for shape in left.noise)
     if NOISY in warned and not left.structure:
         yield "much noise"
     yield from (f"no {name}" for name in _WANTED if name not in known)

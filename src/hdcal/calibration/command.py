@@ -80,7 +80,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
             not (dynamic or settings["effects"]) and settings.get("with_gap") is None
         )
         if plain and case is not None:
-            from hdcal.calibration.straight_part import takes_straight_part
+            from hdcal.calibration.straight_line import takes_straight_part
             from hdcal.screening.working_range import STRAIGHT
 
             if takes_straight_part(case):

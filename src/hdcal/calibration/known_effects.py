@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from hdcal.data.case import Case
 from hdcal.errors import Finding, Findings
-from hdcal.inference.members import MEMBER_SD
+from hdcal.inference.problem import MEMBER_SD
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
@@ -40,7 +40,7 @@ def check_effect_priors(
 
     Raises:
         InputError: an effect or parameter is not in the library, the unit is of
-            another kind, or the spread belongs to the model's own members.
+            another kind, or the spread is that of members of the model.
     """
     known = {
         f"{name}.{field}": spec.unit

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -11,17 +11,11 @@ import xarray as xr
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.exported import jit
-from hdcal.inference.checks import (
-    Check,
-    bound_check,
-    conflict_check,
-    identification_checks,
-    sampling_checks,
-)
+from hdcal.inference.checks import Check, bound_check, conflict_check, sampling_checks
 from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.identifiability import unidentified
+from hdcal.inference.identifiability import identification_checks
 from hdcal.inference.likelihood import densities, pointwise_log_likelihood
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior_tree import data_groups, dataset, units_in
@@ -35,7 +29,7 @@ _PRIOR_DRAWS = 2000
 # The log likelihood of every row and draw is not kept above this many numbers.
 MOST_LOG_LIKELIHOODS = 8_000_000
 TOTAL = "total"
-# Units of what follows from the parameters, and of what has no prior of its specifics.
+# Units of what follows from the parameters, and of members.
 _UNITS = {
     "stiffness": "N/mm",
     "damping": "N*s/mm",
@@ -46,32 +40,18 @@ _UNITS = {
 }
 
 
-@dataclass(frozen=True)
-class Specifics:
-    """Results of one kind of calibration that `assemble` takes over.
-
-    Attributes:
-        log_likelihood: by observed column, (chain, draw, row); none for many rows.
-        sensitivities: of the mean reading to each parameter, in noise sds.
-        mixed: further quantities whose chains must have mixed, (chain, draw) each.
-        checks: further ones.
-        observed: columns of the records that the model explains.
-    """
-
-    log_likelihood: Mapping[str, np.ndarray]
-    sensitivities: Mapping[str, np.ndarray]
-    mixed: Mapping[str, np.ndarray]
-    checks: Sequence[Check]
-    observed: tuple[str, ...] = ("force",)
-
-
 def assemble(
     case: Case,
     priors: Mapping[str, Prior],
     problem: Sampled,
     draws: Draws,
-    specifics: Specifics,
+    *,
     seed: int,
+    log_likelihood: Mapping[str, np.ndarray],
+    sensitivities: Mapping[str, np.ndarray],
+    mixed: Mapping[str, np.ndarray],
+    checks: Sequence[Check],
+    observed: tuple[str, ...] = ("force",),
 ) -> tuple[xr.DataTree, dict[str, Convergence], tuple[Check, ...]]:
     """Return the tree, diagnoses and checks of a posterior.
 
@@ -80,11 +60,15 @@ def assemble(
         priors: of every site.
         problem: inference problem.
         draws: from the sampler.
-        specifics: results of this kind of calibration.
         seed: of the prior draws.
+        log_likelihood: by observed column, (chain, draw, row); none for many rows.
+        sensitivities: of the mean reading to each parameter, in noise sds.
+        mixed: further quantities whose chains must have mixed, (chain, draw) each.
+        checks: further ones.
+        observed: columns of the records that the model explains.
     """
     values = draws.values
-    log_prior, log_likelihood = map(np.asarray, densities(problem, values))
+    log_prior, total = map(np.asarray, densities(problem, values))
     # Draws are compared with the priors given how the mountings differ.
     problem = replace(problem, priors=problem.priors_given(draws.median))
     sampled = {
@@ -93,7 +77,7 @@ def assemble(
         if name in values and prior.family != "fixed"
     }
     scalars = {name: values[name] for name in sampled}
-    diagnoses = diagnose_parameters(scalars, sampled, log_prior, log_likelihood)
+    diagnoses = diagnose_parameters(scalars, sampled, log_prior, total)
     rng = np.random.default_rng(seed)
     prior_draws = {
         name: sample_prior(prior, name, rng, _PRIOR_DRAWS)[None]
@@ -105,43 +89,19 @@ def assemble(
     groups = {
         "posterior": dataset(values, units=units, labels=labels),
         "prior": dataset(prior_draws, units=units),
-        "sample_stats": dataset(_statistics(draws)),
-        **data_groups(case.records, specifics.observed, case.units),
-        "log_likelihood": _likelihood_group(specifics.log_likelihood, log_likelihood),
+        "sample_stats": dataset(draws.statistics),
+        **data_groups(case.records, observed, case.units),
+        # The total has members integrated out, where they were.
+        "log_likelihood": dataset(log_likelihood or {TOTAL: total}),
     }
     checks = (
-        *sampling_checks(draws, diagnoses | mixing(specifics.mixed)),
-        *specifics.checks,
+        *sampling_checks(draws, diagnoses | mixing(mixed)),
+        *checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
-        *identification_checks(*unidentified(specifics.sensitivities, problem)),
+        *identification_checks(sensitivities, problem.priors),
     )
     return xr.DataTree.from_dict(groups), diagnoses, checks
-
-
-def _likelihood_group(by_row: Mapping[str, np.ndarray], total: np.ndarray):
-    """Return the log likelihood by row, or the total where there is none."""
-    if by_row:
-        return dataset(by_row)
-    group = dataset({TOTAL: total})
-    group[TOTAL].attrs["comment"] = (
-        "log likelihood of all rows, runs, specimens and gap integrated out where "
-        "they were; values by row are not kept for so many rows"
-    )
-    return group
-
-
-def _statistics(draws: Draws) -> dict[str, np.ndarray]:
-    """Return the statistics of the sampler under ArviZ' names, (chain, draw) each."""
-    return {
-        "energy": draws.energy,
-        "lp": -draws.potential,
-        "diverging": draws.diverging,
-        "n_steps": draws.n_steps,
-        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
-        "acceptance_rate": draws.acceptance,
-        "step_size": draws.step_size,
-    }
 
 
 def force_log_likelihood(
@@ -149,7 +109,7 @@ def force_log_likelihood(
 ) -> dict[str, np.ndarray]:
     """Return the log likelihood of each row and draw; nothing if they are many."""
     rows = len(case.records.force)
-    if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
+    if np.prod(draws.shape) * rows > MOST_LOG_LIKELIHOODS:
         return {}
     padded = pad_records(case.records)
     columns = discrepancy_columns(problem.discrepancy, padded)
@@ -170,7 +130,7 @@ def _pointwise(problem, values, records, columns, before):
 def run_settings(draws: Draws, began: float) -> dict[str, object]:
     """Return the settings known after a run that began at a `time.perf_counter`."""
     return {
-        "draws": draws.energy.shape[1],
+        "draws": draws.shape[1],
         "target_acceptance": draws.target_acceptance,
         "versions": versions(),
         "seconds": round(time.perf_counter() - began, 3),

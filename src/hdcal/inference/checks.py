@@ -13,7 +13,7 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, MAX_TREE_DEPTH, Mixing
 from hdcal.inference.distributions import frozen
-from hdcal.inference.serial_correlation import CORRELATION, worth
+from hdcal.inference.serial_correlation import CORRELATION
 
 if TYPE_CHECKING:
     from hdcal.inference.sample import Draws
@@ -31,9 +31,9 @@ CONFLICT_TAIL = 0.0027
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation that is reported where it is larger with 95 % probability [-].
 _REPORTED_CORRELATION = 0.1
-# A correlation from which intervals are too narrow where readings are worth fewer than
-# so many independent ones (tests/inference/test_correlation_prior.py).
-_STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 26.0
+# A correlation from which intervals are too narrow where readings determine a mean no
+# better than so many independent ones (tests/inference/test_correlation_prior.py).
+_STRONG_CORRELATION, _FEW_EFFECTIVE = 0.5, 26.0
 
 
 @dataclass(frozen=True)
@@ -56,21 +56,17 @@ def _check(name: str, passed: bool, words: str) -> Check:
 
 
 def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
-    """Return the checks on the sampler: any of them failed fails the result.
-
-    Args:
-        draws: from the sampler.
-        mixed: convergence by quantity.
-    """
+    """Return the checks on the sampler: any of them failed fails the result."""
     from arviz_stats.base.array import array_stats
 
     # NaN, which no check passes, where the energy stands still.
     with np.errstate(all="ignore"):
-        energy = np.asarray(array_stats.bfmi(draws.energy))
-    divergent = int(draws.diverging.sum())
-    saturated = float((draws.n_steps >= 2**MAX_TREE_DEPTH - 1).mean())
+        energy = np.asarray(array_stats.bfmi(draws.statistics["energy"]))
+    diverging, steps = draws.statistics["diverging"], draws.statistics["n_steps"]
+    divergent = int(diverging.sum())
+    saturated = float((steps >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
-        *mixing_checks(mixed, len(draws.energy)),
+        *mixing_checks(mixed, draws.shape[0]),
         _check(
             "energy is explored (BFMI)",
             bool(np.all(energy >= MIN_BFMI)),
@@ -79,7 +75,7 @@ def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check,
         _check(
             "no divergent trajectories",
             divergent == 0,
-            f"{divergent} of {draws.diverging.size} draws diverged, allowed 0",
+            f"{divergent} of {diverging.size} draws diverged, allowed 0",
         ),
         _check(
             "trajectories end by themselves (tree depth)",
@@ -124,29 +120,33 @@ def correlation_check(
         return Check(INDEPENDENT, "note", words)
     least, *ends, middle = np.quantile(draws[CORRELATION], [0.05, 0.025, 0.975, 0.5])
     if least < _REPORTED_CORRELATION:
-        return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
+        return Check(
+            INDEPENDENT, "passed", "the readings show no correlation of neighbours"
+        )
     span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
-    left = worth(rows, float(middle))
-    if middle < _STRONG_CORRELATION or left > _LITTLE_WORTH:
+    # 1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|: the variance of a mean.
+    effective = (rows - (rows - 2) * middle) / (1.0 + middle)
+    if middle < _STRONG_CORRELATION or effective > _FEW_EFFECTIVE:
         return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
     return Check(
         INDEPENDENT,
         "warning",
-        f"{words}. Every interval allows for it, but these readings are worth some "
-        f"{left:.0f} independent ones, and 95 % intervals hold the truth less often: "
-        "in 85 % of ramps of 60 rows with a correlation of 0.9. Read longer, or repeat",
+        f"{words}. Every interval allows for it, but these readings are equivalent to "
+        f"some {effective:.0f} independent ones, and 95 % intervals hold the truth "
+        "less often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read "
+        "longer or repeat",
     )
 
 
 def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
-    """Report noise that grows with the force, asked for or in the model unasked."""
+    """Report noise that grows with the force, on request or by the readings."""
     name = "readings scatter alike at any {load}"
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
     words = (
-        f"readings scatter by {np.median(share):.1%} of the {{load}}, beside σ at no "
+        f"readings scatter by {np.median(share):.1%} of the {{load}}, and by σ at no "
         "{load}; every interval allows for it"
     )
     if unasked:
@@ -194,7 +194,7 @@ def conflict_check(
     elif all("." in parameter for parameter in far):
         # A wrong unit shows in more than in parameters of effects.
         name = "prior and effects agree"
-        remedy = "Where the rig explains it, give it a prior of its own"
+        remedy = "Where the rig explains it, state a prior for it"
     else:
         name = PLAUSIBLE
         remedy = (
@@ -229,20 +229,3 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
 def listed(names: list[str]) -> str:
     """Return names as a list in words."""
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
-
-
-def identification_checks(
-    without_effect: list[str], flat: list[str]
-) -> tuple[Check, ...]:
-    """Report parameters and directions that the prior decides, from `unidentified`."""
-    seen, apart = "every parameter is seen by the data", "parameters can be told apart"
-    checks = [
-        Check(seen, "note", f"{name}: these data say nothing, the prior is the answer")
-        for name in without_effect
-    ]
-    checks += [Check(apart, "note", sentence) for sentence in flat]
-    if not without_effect:
-        checks.append(Check(seen, "passed", "each one moves the predicted readings"))
-    if not flat:
-        checks.append(Check(apart, "passed", "no direction is left to the priors"))
-    return tuple(checks)

@@ -111,14 +111,7 @@ def diagnose_parameters(
     log_prior: np.ndarray,
     log_likelihood: np.ndarray,
 ) -> dict[str, Convergence]:
-    """Return the convergence of each scalar parameter, and what decides it.
-
-    Args:
-        draws: of each parameter, (chain, draw).
-        priors: of each parameter.
-        log_prior: of each draw.
-        log_likelihood: of each draw, all data.
-    """
+    """Return the convergence of each scalar parameter, and what decides it."""
     to_prior = power_sensitivity(draws, log_prior)
     to_data = power_sensitivity(draws, log_likelihood)
     diagnoses = {}
@@ -154,10 +147,6 @@ def power_sensitivity(
     """Return how much each parameter changes with the power of prior or likelihood.
 
     The weights are not Pareto-smoothed: so near to one they have no tail.
-
-    Args:
-        draws: of each parameter, (chain, draw).
-        log_part: log prior or log likelihood of each draw.
     """
     from arviz_stats.base.array import array_stats
 

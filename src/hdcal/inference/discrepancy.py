@@ -45,6 +45,7 @@ class Discrepancy(eqx.Module):
     half_range: float
     absorbed: Float[Array, "2 m"]
     directed: bool = eqx.field(static=True, default=False)
+    # A size that does not depend on the effects: draws of several models are joined.
     loop: float = 1.0
 
     @property
@@ -68,11 +69,11 @@ class Discrepancy(eqx.Module):
         """
         scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
         line = jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
-        functions = smooth = _basis(scaled)
+        functions = _basis(scaled)
         if self.directed:
-            half = jnp.concatenate([line, smooth[:, :_LOOP_SIZE]], axis=1)
+            half = jnp.concatenate([line, functions[:, :_LOOP_SIZE]], axis=1)
             half = jnp.asarray(movement)[:, None] * half
-            functions = jnp.concatenate([smooth, half], axis=1)
+            functions = jnp.concatenate([functions, half], axis=1)
         # Multiplied last, so that nothing of an unused loop is left.
         used = jnp.where(jnp.arange(self.size) < BASIS_SIZE, 1.0, self.loop)
         return used * (functions - line @ self.absorbed)
@@ -93,15 +94,6 @@ class Discrepancy(eqx.Module):
         return jnp.concatenate([smooth, jnp.full(2, sd), smooth[:_LOOP_SIZE]])
 
 
-def leftover_size(records: Records) -> int:
-    """Return the number of weights of the discrepancy of a case.
-
-    Args:
-        records: of the case.
-    """
-    return BASIS_SIZE + (2 + _LOOP_SIZE) * ("unloading" in records.known)
-
-
 def build_discrepancy(
     records: Records, effects: Sequence[type[Effect]] = ()
 ) -> Discrepancy:
@@ -115,8 +107,9 @@ def build_discrepancy(
     deformation = np.asarray(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))
     centre, half_range = (low + high) / 2.0, (high - low) / 2.0
-    nothing = np.zeros((2, leftover_size(records)))
-    raw = Discrepancy(centre, half_range, nothing, "unloading" in records.known)
+    directed = "unloading" in records.known
+    nothing = np.zeros((2, BASIS_SIZE + (2 + _LOOP_SIZE) * directed))
+    raw = Discrepancy(centre, half_range, nothing, directed)
     functions = np.asarray(discrepancy_columns(raw, pad_records(records)))
     scaled = (deformation - centre) / half_range
     line = np.column_stack([np.ones_like(scaled), scaled])
@@ -128,12 +121,7 @@ def build_discrepancy(
 def discrepancy_columns(
     discrepancy: Discrepancy | None, records: Records
 ) -> np.ndarray | None:
-    """Return the projected basis at padded rows; None without a discrepancy.
-
-    Args:
-        discrepancy: of the problem, or None.
-        records: of a bucket's length.
-    """
+    """Return the projected basis at padded rows; None without a discrepancy."""
     if discrepancy is None:
         return None
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))

@@ -1,7 +1,6 @@
 """Prior families as NumPyro distributions and as frozen SciPy distributions."""
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -48,42 +47,41 @@ def frozen(prior: Prior, name: str = "") -> Any:
     Raises:
         ValueError: the family has none, such as a fixed value.
     """
-    return _frozen(prior.family, (*map(float, prior.numbers),), name in POSITIVE)
-
-
-# A SciPy distribution takes longer to make than to evaluate.
-@lru_cache(maxsize=1024)
-def _frozen(family: str, numbers: tuple[float, ...], positive: bool) -> Any:
-    from scipy import stats
-
-    first, second = (*numbers, math.nan)[:2]
-    match family:
-        case "normal" if positive:
-            return stats.truncnorm(-first / second, math.inf, first, second)
-        case "normal":
-            return stats.norm(first, second)
-        case "lognormal":
-            return stats.lognorm(second, scale=first)
-        case "half_normal":
-            return stats.halfnorm(scale=first)
-        case "uniform":
-            return stats.uniform(first, second - first)
-        case "beta":
-            return stats.beta(first, second)
-    raise ValueError(f"no distribution for the prior family {family!r}")
+    return _frozen(prior.family, (*map(float, prior.numbers),), name in POSITIVE)[0]
 
 
 def moments(prior: Prior, name: str = "") -> tuple[float, float]:
     """Return mean and sd of the prior of a parameter; the sd of a fixed one is 0."""
     if prior.family == "fixed":
         return float(prior.numbers[0]), 0.0
-    return _moments(prior.family, (*map(float, prior.numbers),), name in POSITIVE)
+    return _frozen(prior.family, (*map(float, prior.numbers),), name in POSITIVE)[1]
 
 
+# A SciPy distribution takes longer to make than to evaluate.
 @lru_cache(maxsize=1024)
-def _moments(family: str, numbers: tuple[float, ...], positive: bool):
-    found = _frozen(family, numbers, positive)
-    return float(found.mean()), float(found.std())
+def _frozen(
+    family: str, numbers: tuple[float, ...], positive: bool
+) -> tuple[Any, tuple[float, float]]:
+    """Return a SciPy distribution with its mean and sd."""
+    from scipy import stats
+
+    first, second = (*numbers, math.nan)[:2]
+    match family:
+        case "normal" if positive:
+            found = stats.truncnorm(-first / second, math.inf, first, second)
+        case "normal":
+            found = stats.norm(first, second)
+        case "lognormal":
+            found = stats.lognorm(second, scale=first)
+        case "half_normal":
+            found = stats.halfnorm(scale=first)
+        case "uniform":
+            found = stats.uniform(first, second - first)
+        case "beta":
+            found = stats.beta(first, second)
+        case _:
+            raise ValueError(f"no distribution for the prior family {family!r}")
+    return found, (float(found.mean()), float(found.std()))
 
 
 def sample_prior(
@@ -93,25 +91,3 @@ def sample_prior(
     if prior.family == "fixed":
         return np.full(count, float(prior.numbers[0]))
     return np.asarray(frozen(prior, name).ppf(rng.random(count)))
-
-
-def effective_priors(
-    priors: Mapping[str, Prior], values: Mapping, mountings: int
-) -> dict[str, Prior]:
-    """Return the priors, that of the force zero given how mountings differ.
-
-    A certificate states the zero of the gauge itself. To it the mean of n tested
-    mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
-
-    Args:
-        priors: by site name.
-        values: parameters of one draw, or medians of them.
-        mountings: n; 0 where no certificate states the zero, or none differ.
-    """
-    if not mountings:
-        return dict(priors)
-    zero = priors["force_offset"]
-    middle, gauge = zero.numbers
-    of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(mountings)
-    both = Prior("normal", (middle, jnp.hypot(gauge, of_mean)), zero.unit, zero.source)
-    return {**priors, "force_offset": both}

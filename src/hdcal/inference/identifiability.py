@@ -6,25 +6,22 @@ from itertools import combinations
 
 import jax
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
+from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.exported import jit
-from hdcal.inference.checks import listed
+from hdcal.inference.checks import Check, listed
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen, moments
-from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.padding import pad_records
-from hdcal.inference.problem import Problem
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.problem import MEMBER_SD, MEMBERS, Problem
 from hdcal.inference.values import predict_rows
 from hdcal.physics.effect import parameters
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
-_MOST_MEMBERS = 200
-# A flat direction is named with the parameters that carry this part of it.
-_SHARE = 0.3
 # A parameter that moves the mean by fewer noise sds over its whole prior has no effect.
 _NO_EFFECT = 1e-3
 
@@ -37,8 +34,7 @@ class Linearisation:
         sd: of the noise, rounding included [N], shape (n,).
         slopes: derivatives by parameter [N per unit of the parameter], shape (n,).
         members: contribution of each run, specimen and weight of the discrepancy per
-            prior sd [N], shape (n, m). Runs or specimens by the hundred are left out:
-            one of them matters little.
+            prior sd [N], shape (n, m).
         place: values of the members, in prior sds, shape (m,).
     """
 
@@ -73,41 +69,37 @@ def linearise(
         for name in (*_MEAN, *(n for n in values if n.partition(".")[0] in of_mean))
         if name in values and problem.priors[name].family != "fixed"
     )
+    kinds = [kind for kind, site in MEMBERS.items() if site in values]
+    names += tuple(MEMBERS[kind] for kind in kinds)
     parts = _derivatives(problem, values, padded, columns, names=names)
-    sd, slopes, stiffening = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
+    sd, slopes = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
     members, place = [np.zeros((rows, 0))], [np.zeros(0)]
-    for kind, count, size in (
-        ("run", problem.runs, np.ones(rows)),
-        ("specimen", problem.specimens, stiffening),
-    ):
-        if 0 < count <= _MOST_MEMBERS:
-            scale = values[MEMBER_SD[kind]]
+    for kind in kinds:
+        site = MEMBERS[kind]
+        if kind == "discrepancy" and problem.discrepancy is not None:
+            sizes = values["gap_sd"], values["gap_length"]
+            scale = np.asarray(problem.discrepancy.prior_sd(*sizes))
+            root = np.diag(scale)
+        else:
             # Members are deviations from the mean of the tested ones.
-            labelled = getattr(records, kind)[:, None] == np.arange(count)
-            members.append(scale * size[:, None] * (labelled - 1.0 / count))
-            place.append(values[MEMBERS[kind]] / scale)
-    if problem.discrepancy is not None and columns is not None:
-        sizes = values["gap_sd"], values["gap_length"]
-        scale = np.asarray(problem.discrepancy.prior_sd(*sizes))
-        members.append(columns[:rows] * scale)
-        place.append(values["gap_weights"] / scale)
+            scale, count = values[MEMBER_SD[kind]], len(values[site])
+            root = scale * (np.eye(count) - 1.0 / count)
+        members.append(slopes.pop(site) @ root)
+        place.append(values[site] / scale)
     sd = np.sqrt(sd**2 + problem.step**2 / 12.0)
     return Linearisation(sd, slopes, np.hstack(members), np.concatenate(place))
 
 
 @jit(static_argnames=("names",))
 def _derivatives(problem: Problem, values, records: Records, columns, *, names):
-    """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
+    """Return noise sd and derivatives of the mean reading by name."""
 
     def mean(part):
         mean, noise = predict_rows(problem, {**values, **part}, records, columns)
         return mean, noise.sd[0]
 
-    def stiffer(share):
-        return mean({"K": values["K"] * (1.0 + share)})[0]
-
     slopes, sd = jax.jacfwd(mean, has_aux=True)({name: values[name] for name in names})
-    return sd, slopes, jax.jvp(stiffer, (0.0,), (1.0,))[1]
+    return sd, slopes
 
 
 def resolved_units(
@@ -147,96 +139,70 @@ def resolved_units(
                 fixed = prior.family == "fixed"
                 values[name] = prior.numbers[0] if fixed else frozen(prior).median()
     padded, rows = pad_records(records), len(base_columns)
-    _, slopes, _ = _derivatives(problem, values, padded, None, names=tuple(widest))
-    return {
-        name: standard_error(
-            np.asarray(slopes[name])[:rows], base_columns, noise_sd, most
-        )
-        for name, most in widest.items()
-    }
+    _, slopes = _derivatives(problem, values, padded, None, names=tuple(widest))
+    units = dict(widest)
+    for name, most in widest.items():
+        slope = np.asarray(slopes[name])[:rows]
+        fitted = base_columns @ np.linalg.lstsq(base_columns, slope, rcond=None)[0]
+        length = float(np.linalg.norm(slope - fitted))
+        if length > 0.0 and noise_sd > 0.0:
+            units[name] = min(most, noise_sd / length)
+    return units
 
 
-def standard_error(
-    column: np.ndarray, columns: np.ndarray, noise_sd: float, most: float
-) -> float:
-    """Return the standard error of a parameter fitted together with others.
-
-    Args:
-        column: derivative of the mean reading by the parameter, shape (n,).
-        columns: derivatives by the others, to any scale, shape (n, p).
-        noise_sd: of the readings.
-        most: the largest error, such as a prior sd.
-    """
-    fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
-    length = float(np.linalg.norm(column - fitted))
-    return min(most, noise_sd / length) if length > 0.0 and noise_sd > 0.0 else most
-
-
-def unidentified(
-    sensitivities: Mapping[str, np.ndarray], problem: Sampled
-) -> tuple[list[str], list[str]]:
-    """Return parameters without any effect, and a sentence for each flat direction.
+def identification_checks(
+    sensitivities: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
+) -> tuple[Check, ...]:
+    """Report parameters and combinations of them that the prior decides.
 
     A direction v is flat where the data have less information than the priors:
     ‖J v‖² < ‖v/S‖² with J the sensitivities in noise sds and S the prior sds.
     """
     # In units of its prior sd every parameter has prior precision one.
-    scaled = {
-        name: slope * moments(problem.priors[name], name)[1]
-        for name, slope in sensitivities.items()
-    }
+    scaled = {n: s * moments(priors[n], n)[1] for n, s in sensitivities.items()}
     length = {name: float(np.linalg.norm(column)) for name, column in scaled.items()}
-    without_effect = [name for name in scaled if length[name] < _NO_EFFECT]
-    sentences = [
-        f"{name} is hardly seen by this data; its prior is the answer"
+    unseen = [name for name in scaled if length[name] < _NO_EFFECT]
+    flat = [
+        f"{name} hardly changes the readings: its prior decides it"
         for name in scaled
         if _NO_EFFECT <= length[name] < 1.0
     ]
-    strong = {name: column for name, column in scaled.items() if length[name] >= 1.0}
-    if len(strong) > 1:
-        # As few numbers as have the same inner products.
-        few = np.linalg.qr(np.stack([*strong.values()], axis=1), mode="r")
-        groups = _inseparable(dict(zip(strong, np.transpose(few), strict=True)))
-        for names in groups:
-            every, words = listed(names), "one combination of them can"
-            if set(names) == {"K", "E0"}:
-                every = "K and E0"
-                words = "their product can, and with the prior of E0 that tells K"
-            sentences.append(f"{every} cannot be told apart by this data; {words}")
-    return without_effect, sentences
+    for names in _inseparable({n: c for n, c in scaled.items() if length[n] >= 1.0}):
+        words = "one combination of them can"
+        if set(names) == {"K", "E0"}:
+            words = "their product can, and with the prior of E0 that determines K"
+        flat.append(f"{listed(names)} cannot be distinguished by these data; {words}")
+    seen, apart = (
+        "every parameter changes the readings",
+        "parameters are distinguishable",
+    )
+    none = Check(seen, "passed", "each one changes the predicted readings")
+    every = Check(apart, "passed", "no direction is left to the priors")
+    unseen = [
+        Check(
+            seen,
+            "note",
+            f"{name}: does not change these readings, the prior decides it",
+        )
+        for name in unseen
+    ]
+    flat = [Check(apart, "note", sentence) for sentence in flat]
+    return *(unseen or [none]), *(flat or [every])
 
 
-def _inseparable(columns: dict[str, np.ndarray]) -> list[list[str]]:
-    """Return as many groups as there are flat directions, pairs before larger ones."""
-    strength, vectors = _strengths(list(columns.values()))
-    flat = int(np.sum(strength < 1.0))
-    # Rounded, so that the first of equal directions is named.
-    weakest = {
-        pair: round(float(_strengths([columns[name] for name in pair])[0][-1]), 9)
-        for pair in combinations(columns, 2)
-    }
-    groups: list[list[str]] = []
-    linked: dict[str, set[str]] = {name: {name} for name in columns}
-    for (one, other), least in sorted(weakest.items(), key=lambda item: item[1]):
-        if least >= 1.0 or len(groups) == flat:
-            break
-        # A pair that others already link is no further direction.
-        if other not in linked[one]:
-            joined = linked[one] | linked[other]
-            linked |= dict.fromkeys(joined, joined)
-            groups.append([one, other])
-    for vector in vectors[::-1][: flat - len(groups)]:
-        part = np.abs(vector) / np.abs(vector).max()
-        names = [n for n, p in zip(columns, part, strict=True) if p >= _SHARE]
-        if len(names) > 2:
-            groups.append(names)
-    return groups
-
-
-def _strengths(columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return singular values, largest first, and right singular vectors."""
-    table = np.stack(columns, axis=1)
-    # One singular value per column, also with fewer rows than columns.
-    padded = np.vstack([table, np.zeros((table.shape[1], table.shape[1]))])
-    _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
-    return strength, vectors
+def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
+    """Return groups of parameters of which pairs have a flat direction."""
+    names = [name for name in {**dict.fromkeys(_MEAN), **columns} if name in columns]
+    if len(names) < 2:
+        return []
+    # As few numbers as have the same inner products.
+    table = np.stack([columns[name] for name in names], axis=1)
+    few: np.ndarray = np.asarray(np.linalg.qr(table, mode="r"))
+    linked = np.zeros((len(names), len(names)))
+    for pair in combinations(range(len(names)), 2):
+        linked[pair] = np.linalg.svd(few[:, [*pair]], compute_uv=False)[-1] < 1.0
+    count, group = connected_components(linked, directed=False)
+    groups = (
+        [n for n, g in zip(names, group, strict=True) if g == i] for i in range(count)
+    )
+    return [members for members in groups if len(members) > 1]

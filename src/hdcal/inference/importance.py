@@ -10,24 +10,24 @@ Source:
     Research 25 (2024), Pareto k.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float
-from scipy.special import softmax
+from scipy.special import logsumexp, softmax
 from scipy.stats import multivariate_t
 
 from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.inference.diagnostics import pareto_shape
 from hdcal.inference.laplace import Whitening, potential, values_at
+from hdcal.inference.sample import Progress
 from hdcal.inference.sampled_problem import Sampled
 
 # Largest Pareto k of weights whose proposals cover the posterior.
 MAX_SHAPE = 0.7
-# Tails heavier than a posterior's, which keep weights bounded.
+# Degrees of freedom: tails heavier than a posterior's, which keep weights bounded.
 _FREEDOM = 8.0
 # Shares of the distributions, and their widths in that of the weighted proposals: the
 # widest one reaches tails that fall off exponentially.
@@ -42,38 +42,31 @@ _MOST = 12
 _BLOCK = 500
 
 
-class TMixture(NamedTuple):
-    """A mixture of multivariate t distributions of equal degrees of freedom.
+class Proposals(NamedTuple):
+    """Multivariate t distributions of increasing width about one centre.
 
     Attributes:
-        share: of each component, shape (k,).
-        centre: shape (k, d).
-        root: Cholesky factor of the scale matrix, shape (k, d, d).
-        freedom: degrees of it.
+        centre: shape (d,).
+        covariance: scale matrix of the narrowest one, shape (d, d).
     """
 
-    share: np.ndarray
     centre: np.ndarray
-    root: np.ndarray
-    freedom: float = _FREEDOM
+    covariance: np.ndarray
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Return places, shape (count, d)."""
-        component = rng.choice(len(self.share), count, p=self.share)
-        normal = rng.standard_normal((count, self.centre.shape[1]))
-        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
-        step = np.einsum("nij,nj->ni", self.root[component], normal)
-        return self.centre[component] + tail[:, None] * step
+        step = self._t(1.0).rvs(count, rng).reshape(count, -1) - self.centre
+        width = rng.choice(_WIDTHS, count, p=_SHARES)
+        return self.centre + width[:, None] * step
 
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
-        scipy_t: Any = multivariate_t
-        each = [
-            scipy_t.logpdf(place, centre, root @ root.T, self.freedom)
-            for centre, root in zip(self.centre, self.root, strict=True)
-        ]
-        each = np.reshape(each, (len(self.share), -1))
-        return np.logaddexp.reduce(np.log(self.share)[:, None] + each)
+        each = [self._t(width).logpdf(place) for width in _WIDTHS]
+        return logsumexp(each, axis=0, b=_SHARES[:, None])
+
+    def _t(self, size: float) -> Any:
+        scale: Any = size**2 * self.covariance
+        return multivariate_t(self.centre, scale, _FREEDOM)  # pyright: ignore
 
 
 class ImportanceDraws(NamedTuple):
@@ -95,7 +88,7 @@ def sample_by_importance(
     *,
     chains: int,
     draws: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> ImportanceDraws | None:
     """Draw from a posterior with few parameters, in its whitened coordinates.
 
@@ -123,16 +116,15 @@ def sample_by_importance(
     level = (np.arange(kept) + rng.random()) / kept
     chosen = np.searchsorted(np.cumsum(weight), level).clip(max=len(place) - 1)
     standard = place[rng.permutation(chosen)].reshape(chains, draws, -1)
-    named = _named(problem, whitening, standard)
-    return ImportanceDraws({n: np.asarray(v) for n, v in named.items()}, shape)
+    return ImportanceDraws(jax.device_get(_named(problem, whitening, standard)), shape)
 
 
 def _adapted(
     problem: Sampled, whitening: Whitening, rng: np.random.Generator
-) -> tuple[TMixture, float]:
+) -> tuple[Proposals, float]:
     """Return proposals, and the effective sample size for each of the last ones."""
     size, efficiency = len(whitening.factor), 0.0
-    proposals = _proposals(np.zeros(size), np.eye(size))
+    proposals = Proposals(np.zeros(size), np.eye(size))
     for count in _ROUNDS:
         place = proposals.draw(count, rng)
         weight = _weights(problem, whitening, proposals, place)
@@ -144,25 +136,18 @@ def _adapted(
         # A few places with most of the weight would decide mean and covariance.
         share = np.minimum(weight, 1.0 / np.sqrt(count))
         share /= share.sum()
-        centre = share @ place
-        off = place - centre
-        covariance = (share * off.T) @ off + _LEAST_VARIANCE * np.eye(size)
-        proposals = _proposals(centre, covariance)
+        covariance = np.cov(place.T, aweights=share, ddof=0).reshape(size, size)
+        covariance += _LEAST_VARIANCE * np.eye(size)
+        proposals = Proposals(share @ place, covariance)
     return proposals, float(efficiency)
-
-
-def _proposals(centre: np.ndarray, covariance: np.ndarray) -> TMixture:
-    root = np.linalg.cholesky(covariance)
-    centres = np.tile(centre, (len(_WIDTHS), 1))
-    return TMixture(_SHARES, centres, _WIDTHS[:, None, None] * root)
 
 
 def _weights(
     problem: Sampled,
     whitening: Whitening,
-    proposals: TMixture,
+    proposals: Proposals,
     place: np.ndarray,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> np.ndarray:
     """Return the importance weight of each place, shape (n, d); they sum to 1."""
     density = np.empty(len(place))

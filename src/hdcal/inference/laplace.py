@@ -1,4 +1,4 @@
-"""The posterior mode and its curvature: whitened coordinates and Laplace's evidence."""
+"""The posterior mode and its curvature: whitened coordinates of the sampler."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -23,7 +23,7 @@ Position = dict[str, Any]
 
 # Length of the gradient at which a search ends [nat per posterior sd], the largest
 # radius of its trust region in such units, and the most steps.
-_TOLERANCE, _LARGEST_RADIUS, _MOST_STEPS = 1e-6, 1e4, 300
+_OPTIONS = {"gtol": 1e-6, "max_trust_radius": 1e4, "maxiter": 300}
 # A search among kinks of the density ends when so many steps gained less [nat].
 _STEPS, _LEAST_GAIN = 12, 1e-3
 
@@ -79,7 +79,7 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     place, flat = _start(problem, dict(start or {}))
     flat = np.asarray(flat)
     hessian = np.asarray(_expand(problem, place, flat)[2])
-    # Parameters differ by many orders in scale: a trust region wants them alike.
+    # Parameters differ by many orders in scale: a trust region needs one scale.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 
     @lru_cache(maxsize=1)
@@ -97,25 +97,13 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
         hess=lambda u: expand(*u)[2],
         method="trust-exact",
         callback=_stop_at_kink() if problem.non_smooth else None,
-        options={
-            "gtol": _TOLERANCE,
-            "max_trust_radius": _LARGEST_RADIUS,
-            "maxiter": _MOST_STEPS,
-        },
+        options=_OPTIONS,
     )
-    factor = scale[:, None] * _inverse_root(result.hess)
+    # A root of the inverse of |Hessian|, its eigenvalues floored.
+    values, vectors = np.linalg.eigh(result.hess)
+    values = np.maximum(np.abs(values), 1e-8 * np.abs(values).max())
+    factor = scale[:, None] * vectors / np.sqrt(values)
     return Whitening(_position(place, flat + scale * result.x), factor)
-
-
-def log_evidence(problem: Sampled, fitted: Whitening) -> float:
-    """Return the log probability of the data under a model, by Laplace's method.
-
-    As if the density were normal around its mode: −U + ½ d log 2π + log|factor|, U the
-    potential at the mode.
-    """
-    volume = np.linalg.slogdet(fitted.factor)[1]
-    volume += 0.5 * len(fitted.factor) * np.log(2.0 * np.pi)
-    return float(volume - potential(problem, fitted.centre))
 
 
 @jit
@@ -187,10 +175,3 @@ def _stop_at_kink():
             raise StopIteration
 
     return stop
-
-
-def _inverse_root(hessian: np.ndarray) -> np.ndarray:
-    """Return a root of the inverse of |hessian|, its eigenvalues floored."""
-    values, vectors = np.linalg.eigh(hessian)
-    values = np.maximum(np.abs(values), 1e-8 * np.abs(values).max())
-    return vectors / np.sqrt(values)

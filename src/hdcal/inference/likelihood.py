@@ -17,12 +17,8 @@ from hdcal.inference.marginal import linear_part
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import CORRELATION, given_before
-from hdcal.inference.values import (
-    Values,
-    predict_rows,
-    with_rounding,
-)
+from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.physics.effect import Noise
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the
@@ -72,12 +68,7 @@ def log_probability(force, mean, noise: Noise, step, *, rounded: bool):
 
 
 def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]:
-    """Return the precision of each row [1/N²], averaged over the mixture's components.
-
-    Args:
-        error: reading less its mean [N].
-        noise: mixture of normals.
-    """
+    """Return the precision of each row [1/N²], averaged over the mixture."""
     log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
     share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
     return jnp.sum(share / noise.sd**2, axis=0)
@@ -89,21 +80,14 @@ def pointwise_log_likelihood(
     """Return the log likelihood of each row given all values [log 1/N].
 
     And given the rows before it in its run, where neighbours may be correlated.
-
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        records: the rows.
-        columns: basis of the discrepancy at the rows, or None.
-        before: index of the row before each in its run, or None.
     """
     mean, noise = predict_rows(problem, values, records, columns)
     noise = with_rounding(noise, problem.step, rounded=problem.rounded)
     if problem.correlated:
-        (sd,), correlation = noise.sd, values[CORRELATION]
-        error = (records.force - mean) / sd
-        mean, sd = given_before(mean, sd, error, before, correlation)
-        noise = Noise(noise.log_weight, sd[None])
+        # Mean and sd of each row given the row before it.
+        (sd,), rho = noise.sd, jnp.where(before >= 0, values[CORRELATION], 0.0)
+        mean = mean + sd * rho * ((records.force - mean) / sd)[before]
+        noise = Noise(noise.log_weight, (sd * jnp.sqrt(1.0 - rho**2))[None])
     return log_probability(
         records.force, mean, noise, problem.step, rounded=problem.rounded
     )
@@ -128,7 +112,7 @@ def _(problem: Problem, values: Values) -> Float[Array, ""]:
 
 
 def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
-    """Return the log prior of the named parameters, each in its own coordinate."""
+    """Return the log prior of the named parameters, each in its native coordinate."""
     total = jnp.zeros(())
     for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":

@@ -2,29 +2,28 @@
 
 Given the shared parameters they are normal a priori and enter a Gaussian likelihood
 linearly. Sampled together with their scale they make funnels, in which a sampler can be
-wrong without a warning. Of runs and specimens the more numerous kind is eliminated one
-by one.
+wrong without a warning. In noise sds the residual is r = Z w + e with standard normal
+scores w. With A = I + Z'Z and u = Z'r:
+
+    log p(r) = −½ [log|A| + r'r − u'A⁻¹u] + constant,   w = A⁻¹u + A^(−½) ξ.
 """
 
 import math
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
-from jaxtyping import Float, Key
+from jax.scipy.linalg import solve_triangular
+from jaxtyping import Float, Int, Key
+from scipy.linalg import helmert
 
 from hdcal.data.records import Array
-from hdcal.inference.linear_gaussian import Grouped, Linear, contrasts
-from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.padding import measured
-from hdcal.inference.problem import Problem
+from hdcal.inference.problem import MEMBER_SD, MEMBERS, Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import CORRELATION, log_volume, whiten
-from hdcal.inference.values import (
-    Values,
-    member_base,
-    predict_rows,
-    with_rounding,
-)
+from hdcal.inference.values import Values, member_base, predict_rows, with_rounding
 from hdcal.physics.chain import linear_coefficients
 
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
@@ -32,19 +31,56 @@ CORE, ONE = 4, 2
 _HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
+class Linear(eqx.Module):
+    """A linear-Gaussian residual in noise sds; rows may be compressed.
+
+    Attributes:
+        residual: reading less its mean, shape (r,).
+        design: Z, contribution of each score to the rows.
+        log_scale: Σ log sd √(2π) over the measured rows.
+    """
+
+    residual: Float[Array, " r"]
+    design: Float[Array, "r m"]
+    log_scale: Float[Array, ""]
+
+    def _solved(self) -> tuple[Float[Array, "m m"], Float[Array, " m"]]:
+        """Return the Cholesky factor of A, and the mean of the scores."""
+        products = self.design.T @ self.design
+        factor = jnp.linalg.cholesky(jnp.eye(len(products)) + products)
+        half = solve_triangular(factor, self.design.T @ self.residual, lower=True)
+        return factor, solve_triangular(factor.T, half, lower=False)
+
+    def log_likelihood(self) -> Float[Array, ""]:
+        """Return log p(y) with the scores integrated out."""
+        factor, mean = self._solved()
+        # A sum of squares: the difference r'r − u'A⁻¹u would lose its digits where
+        # members spread much wider than the noise.
+        left = self.residual - self.design @ mean
+        square = left @ left + mean @ mean
+        volume = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
+        return -0.5 * (square + volume) - self.log_scale
+
+    def draw(self, key: Key[Array, ""]) -> Float[Array, " m"]:
+        """Draw the scores from their distribution given y."""
+        factor, mean = self._solved()
+        noise = jax.random.normal(key, mean.shape)
+        return mean + solve_triangular(factor.T, noise, lower=False)
+
+
 class _Rows(NamedTuple):
     """Rows in noise sds, measured or compressed.
 
     Attributes:
-        labels: rows or blocks of rows, with the indices of their members.
         residual: reading less mean, shape (r,).
+        labels: index of the member of each kind, shape (r,) each.
         columns: contribution of a unit member of each kind to its rows.
         gap: columns of the discrepancy, or None.
         log_scale: Σ log sd √(2π) over the measured rows.
     """
 
-    labels: Any
     residual: Float[Array, " r"]
+    labels: dict[str, Int[Array, " r"]]
     columns: dict[str, Float[Array, " r"]]
     gap: Float[Array, "r m"] | None
     log_scale: Float[Array, ""]
@@ -59,37 +95,40 @@ def linear_part(problem: Problem, values: Values) -> Linear:
     values = {name: value for name, value in values.items() if name not in drawn}
     prepare = _measured_rows if problem.blocks is None else _compressed_rows
     rows = prepare(problem, values)
-    groups = [
-        Grouped(
-            getattr(rows.labels, kind),
-            values[MEMBER_SD[kind]] * rows.columns[kind],
-            getattr(problem, f"{kind}s"),
-        )
-        for kind in _labelled(problem)
-    ]
-    design = [jnp.zeros((len(rows.residual), 0)), *(g.columns() for g in groups[1:])]
-    if "discrepancy" in problem.integrated:
-        assert rows.gap is not None
-        design.append(rows.gap * _gap_sd(problem, values))
-    eliminated = groups[0] if groups else None
-    return Linear(rows.residual, jnp.hstack(design), rows.log_scale, eliminated)
+    design: list[Any] = [jnp.zeros((len(rows.residual), 0))]
+    for kind in problem.integrated:
+        root = _root(problem, values, kind)
+        if kind == "discrepancy":
+            assert rows.gap is not None
+            design.append(rows.gap @ root)
+        else:
+            design.append(rows.columns[kind][:, None] * root[rows.labels[kind]])
+    return Linear(rows.residual, jnp.hstack(design), rows.log_scale)
 
 
-def _labelled(problem: Problem) -> list[str]:
-    """Return the integrated kinds that are labels in the data, most members first."""
-    return [kind for kind in problem.integrated if kind in MEMBER_SD]
+def _root(problem: Problem, values: Values, kind: str) -> Float[Array, "members m"]:
+    """Return a root of the prior covariance of the members of a kind.
 
-
-def _gap_sd(problem: Problem, values: Values) -> Float[Array, " m"]:
+    Runs and specimens are deviations from the mean of the tested ones.
+    """
+    if kind != "discrepancy":
+        return values[MEMBER_SD[kind]] * contrasts(getattr(problem, f"{kind}s"))
     assert problem.discrepancy is not None
-    return problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
+    sd = problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
+    return jnp.diag(sd)
+
+
+def contrasts(count: int) -> Float[Array, "count k"]:
+    """Return an orthonormal basis of deviations that sum to zero, [count, count−1]."""
+    return jnp.asarray(helmert(count).T)
 
 
 def _measured_rows(problem: Problem, values: Values) -> _Rows:
-    mean, noise = predict_rows(problem, values, problem.rows, None)
+    records, before = problem.rows, problem.before
+    mean, noise = predict_rows(problem, values, records, None)
     sd = with_rounding(noise, problem.step).sd[0]
     real = measured(len(sd), problem.count)
-    correlation, before = values.get(CORRELATION, 0.0), problem.before
+    correlation = values.get(CORRELATION, 0.0)
     following = 0 if before is None else jnp.sum(before >= 0)
 
     def white(column):
@@ -99,8 +138,8 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
 
     volume = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
     return _Rows(
-        problem.rows,
-        white(problem.rows.force - mean),
+        white(records.force - mean),
+        {"run": jnp.asarray(records.run)},
         {"run": white(jnp.ones_like(sd))},
         None if problem.columns is None else white(problem.columns),
         volume + log_volume(following, correlation),
@@ -109,20 +148,28 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
 
 def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     assert problem.blocks is not None
-    correlation, noise = values.get(CORRELATION, 0.0), (values["sigma"], problem.step)
-    blocks = problem.blocks.whitened(correlation, *noise)
-    sd = jnp.sqrt(blocks.variance(*noise))
-    factor = blocks.factor / sd[:, None, None]
-    base = member_base(problem, {**values, "force_offset": 0.0})
-    slope = linear_coefficients(base, problem.reading)
-    of_blocks = member_base(problem, values, blocks.run, blocks.specimen)
-    core = linear_coefficients(of_blocks, problem.reading)
+    correlation = values.get(CORRELATION, 0.0)
+    blocks = problem.blocks.whitened(correlation)
+    # Sheppard's correction, which is exact to 2 exp(−2π²σ²/step²).
+    square = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    sd = jnp.sqrt(square)
+    factor = blocks.factor / sd
+    slope = linear_coefficients(
+        member_base(problem, {**values, "force_offset": 0.0}), problem.reading
+    )
+    core = linear_coefficients(
+        member_base(problem, values, blocks.run, blocks.specimen), problem.reading
+    )
     core = jnp.broadcast_to(core, (len(blocks.count), CORE))
     fitted = jnp.einsum("gij,gj->gi", factor[..., :CORE], core)
-    volume = jnp.sum(blocks.count * (jnp.log(sd) + _HALF_LOG_2PI))
+    volume = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
+    size = factor.shape[1]
     return _Rows(
-        blocks,
         (factor[..., -1] - fitted).reshape(-1),
+        {
+            "run": jnp.repeat(blocks.run, size),
+            "specimen": jnp.repeat(blocks.specimen, size),
+        },
         {
             "run": factor[..., ONE].reshape(-1),
             "specimen": (factor[..., :CORE] @ slope).reshape(-1),
@@ -132,27 +179,13 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     )
 
 
-def gap_distribution(
-    problem: Problem, values: Values
-) -> tuple[Float[Array, " m"], Float[Array, "m k"]]:
-    """Return mean and covariance root of the discrepancy's integrated weights."""
-    mean, root = linear_part(problem, values).scores()
-    scale = _gap_sd(problem, values)
-    return scale * mean[-len(scale) :], scale[:, None] * root[-len(scale) :]
-
-
 def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
     """Draw the integrated members, if any, given the shared parameters of one draw."""
     if not isinstance(problem, Problem) or not problem.integrated:
         return {}
-    scores, members = linear_part(problem, values).draw(key)
-    drawn, used = {}, 0
-    for place, kind in enumerate(_labelled(problem)):
-        if place > 0:
-            count = getattr(problem, f"{kind}s")
-            members = contrasts(count) @ scores[used : used + count - 1]
-            used += count - 1
-        drawn[MEMBERS[kind]] = values[MEMBER_SD[kind]] * members
-    if "discrepancy" in problem.integrated:
-        drawn["gap_weights"] = _gap_sd(problem, values) * scores[used:]
+    scores, drawn = linear_part(problem, values).draw(key), {}
+    for kind in problem.integrated:
+        root = _root(problem, values, kind)
+        drawn[MEMBERS[kind]] = root @ scores[: root.shape[1]]
+        scores = scores[root.shape[1] :]
     return drawn

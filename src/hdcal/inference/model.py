@@ -14,18 +14,16 @@ from jax.nn import log_sigmoid, softplus
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
-from hdcal.inference.gauges import with_gains
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import stiffness
+from hdcal.inference.values import stiffness, with_gains
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
 
 CONTACT = "deformation_offset"
 SLACK = "seating_slack.clearance"
-GROWTH = "heteroscedastic_noise.share"
 
 
 def declare(problem: Problem) -> None:
@@ -136,7 +134,7 @@ def _sample_contact(problem: Problem, values: Mapping):
 
 
 def _sample_noise(problem: Problem, values: dict) -> None:
-    """Sample the noise: its sd, the correlation of neighbours, and its growth.
+    """Sample the noise: its sd, the correlation of neighbours, and its effects.
 
     Where neighbours are highly correlated rows determine what each adds to the one
     before, σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of the
@@ -146,10 +144,6 @@ def _sample_noise(problem: Problem, values: dict) -> None:
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
         added = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
-    growth = problem.priors.get(GROWTH, prior)
-    if GROWTH in problem.priors and "fixed" not in (prior.family, growth.family):
-        _sample_growing_noise(problem, values, added)
-    elif problem.correlated:
         values["sigma"] = sample_moved("sigma", prior, "_added_sd", added)
     else:
         values["sigma"] = sample_site("sigma", prior)
@@ -158,45 +152,12 @@ def _sample_noise(problem: Problem, values: dict) -> None:
             _sample_effect(problem, effect, values, added)
 
 
-def _sample_growing_noise(problem: Problem, values: dict, added: Scalar) -> None:
-    """Sample σ and the share s of the load L in the noise by the noise at a usual load.
-
-    The readings determine √(σ² + s² L²) √(1 − ρ²), and hardly the part φ of its square
-    that grows: the logarithm of the one and the log odds of the other are the
-    coordinates. Their logistic densities are divided out. The middle of the first is
-    that of the prior of σ, where a search for the mode starts.
-    """
-    size = jnp.sqrt(_mean_square(problem, problem.rows.deformation))
-    load = stiffness(problem, values) * size
-    logistic = dist.Logistic(0.0, 1.0)
-    log_sd = numpyro.sample("_noise_sd", logistic)
-    odds = numpyro.sample("_noise_growth", logistic)
-    middle = distribution(problem.priors["sigma"], "sigma").icdf(0.5)
-    sd = middle * jnp.exp(log_sd) / added
-    steady, grows = log_sigmoid(jnp.negative(odds)), log_sigmoid(odds)
-    values["sigma"] = numpyro.deterministic("sigma", sd * jnp.exp(steady / 2.0))
-    share = sd * jnp.exp(grows / 2.0) / load
-    values[GROWTH] = numpyro.deterministic(GROWTH, share)
-    log_jacobian = 2.0 * jnp.log(sd) + 0.5 * (steady + grows) - jnp.log(2.0 * load)
-    log_prior = sum(
-        distribution(problem.priors[name], name).log_prob(values[name])
-        for name in ("sigma", GROWTH)
-    )
-    drawn = logistic.log_prob(jnp.stack([log_sd, odds]))
-    numpyro.factor("_noise_prior", log_prior + log_jacobian - jnp.sum(drawn))
-
-
 def _sample_effect(
     problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
-    """Sample the parameters of an effect that have no value yet.
-
-    `over` divides the unit of amplitudes.
-    """
+    """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
-        if name in values:
-            continue
         unit = problem.units.get(name)
         unit = None if unit is None else unit / over
         values[name] = sample_amplitude(name, problem.priors[name], unit)
@@ -232,7 +193,7 @@ def _sample_deviations(name: str, sd, known_sd, count: int):
     """Sample the deviation of each tested member from the mean of the tested ones.
 
     Partially centred: scores are in posterior sds of a member, so that they are as wide
-    where members are alike as where they clearly differ. Either extreme is a funnel for
+    where members agree as where they clearly differ. Either extreme is a funnel for
     the other (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22, 2007).
 
     Args:

@@ -91,10 +91,6 @@ class ModelAverage:
     def load(cls, path: Path | str, effects: Library | None = None) -> "ModelAverage":
         """Read the models of a diagnosis.
 
-        Args:
-            path: a result folder of `diagnose`, or its posterior.nc.
-            effects: as `Posterior.load`.
-
         Raises:
             InputError: as `Posterior.load`.
             NotUsable: the diagnosis failed.

@@ -1,6 +1,6 @@
-"""A pilot fit, and whether the noise that it leaves grows with the deformation."""
+"""A pilot fit by least squares, and whether its noise grows with the deformation."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -19,18 +19,17 @@ _LEAST_ROWS = 12
 # Noise sds over a range that differ by less count as one.
 _LEAST_GROWTH = 1.1
 # Correlation of neighbours that is taken off residuals, at most.
-_MOST_ALIKE = 0.95
+_LARGEST_CORRELATION = 0.95
 # Shares of the range after which the cells of a loop slip.
 _REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
 # Probability that growth is found in noise of one size.
 _FALSE_ALARM = 0.05
-# Slopes of so many specimens have columns; of more each one's line is taken off first.
-MOST_SPECIMENS = 50
+# Of more specimens or runs the lines or means are subtracted first.
+_MOST_COLUMNS = 50
 _stop_cells = jit(stop_cells)
 
 
-@dataclass(frozen=True)
-class Pilot:
+class Pilot(NamedTuple):
     """A fit before any sampling.
 
     Attributes:
@@ -42,40 +41,79 @@ class Pilot:
     noise_sd: float
 
 
-def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
-    """Fit records by generous least squares within runs.
+class Base(NamedTuple):
+    """The base model of least squares.
 
-    Generous, because too small a noise only chooses the exact rounding likelihood,
-    which is never wrong: a cubic in deformation with a slope for each specimen, a step
-    for the direction and temperature terms.
+    Attributes:
+        columns: orthonormal, shape (n, p).
+        force: of each row, less the means or lines that have no column [N].
+        taken: number of these.
+    """
+
+    columns: np.ndarray
+    force: np.ndarray
+    taken: int
+
+    @property
+    def residual(self) -> np.ndarray:
+        """What the columns leave of the force [N]."""
+        return self.force - self.columns @ (self.columns.T @ self.force)
+
+
+def base_model(records: Records, shapes: str = "line") -> Base:
+    """Return the columns of a line for each specimen with a zero for each run.
 
     Args:
         records: the rows.
-        with_loop: also fit a loop of any shape, as of joints that stick and slip, and
-            one that opens with the load.
+        shapes: `line`; `bend` also has a cubic, a step for the direction and a drift
+            with the temperature, which stand for effects; `loop` in addition a loop of
+            any shape, as of joints that stick and slip, and one that opens with the
+            load.
     """
-    scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
-    rise = np.asarray(records.temperature) - np.mean(records.temperature)
-    specimens = np.unique(records.specimen)
-    many = len(specimens) > MOST_SPECIMENS
-    own = [] if many else [scaled * (records.specimen == i) for i in specimens]
-    shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
-    if with_loop:
-        size = np.abs(scaled)
-        shapes += [records.sense * size, records.sense * size**2]
-        shapes += [*loop_cells(records, _REACHES)]
-    run = np.asarray(records.run)
-    *columns, force = (
-        left_of_lines(records, np.asarray(values))
-        if many
-        else less_run_means(np.asarray(values), run)
-        for values in (*own, *shapes, records.force)
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    force, deformation = (
+        np.asarray(values, float) for values in (records.force, records.deformation)
     )
-    design = np.array(columns).T
-    beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
-    residual = force - design @ beta
-    lines = len(specimens) if many else 0
-    free = max(len(force) - int(np.max(run)) - 1 - lines - int(rank), 1)
+    scaled = deformation / (np.max(np.abs(deformation)) or 1.0)
+    place = (deformation - deformation.mean()) / (np.ptp(deformation) or 1.0)
+    rise = np.asarray(records.temperature) - np.mean(records.temperature)
+    sense = np.asarray(records.sense, float)
+    specimens, runs = np.unique(specimen), np.unique(run)
+    columns, taken = [], 0
+    if np.ptp(rise) > 0.0:
+        # The modulus falls with the temperature; a drift of the zero is no part of it.
+        columns += [rise * deformation]
+    if shapes != "line":
+        columns += [place**2, place**3, sense, rise]
+    if shapes == "loop":
+        loop = [sense * np.abs(scaled), sense * scaled**2]
+        columns += [*loop, *loop_cells(records, _REACHES)]
+    if len(specimens) > _MOST_COLUMNS:
+        *columns, force = (left_of_lines(records, one) for one in (*columns, force))
+        taken = len(specimens) + len(runs)
+    else:
+        # Lines through the origin: several specimens in one run share a zero.
+        columns += [scaled * (specimen == i) for i in specimens]
+        if len(runs) > _MOST_COLUMNS:
+            *columns, force = (less_run_means(v, run) for v in (*columns, force))
+            taken = len(runs)
+        else:
+            columns += [(run == i).astype(float) for i in runs]
+    table = np.reshape(columns, (-1, len(force))).T
+    left, strength, _ = np.linalg.svd(table, full_matrices=False)
+    kept = left[:, strength > 1e-10 * strength.max(initial=0.0)]
+    return Base(kept, force, taken)
+
+
+def pilot_fit(records: Records, shapes: str = "bend") -> Pilot:
+    """Fit records by least squares.
+
+    By default generously, because too small a noise only chooses the exact likelihood
+    of rounded readings, which is never wrong.
+    """
+    base = base_model(records, shapes)
+    residual = base.residual
+    free = max(len(residual) - base.columns.shape[1] - base.taken, 1)
     return Pilot(residual, float(np.sqrt(residual @ residual / free)))
 
 
@@ -98,10 +136,6 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     By more than a tenth over the range, which noise in proportion to the deformation
     can do there, with no sd of each row stated and no step of the reading wider than
     the noise. What a loop leaves at its turns is no noise.
-
-    Args:
-        case: records and gear.
-        pilot: fit of these records, where there is one.
     """
     records, pilot = case.records, pilot or pilot_fit(case.records)
     coarse = case.gear.force_resolution > pilot.noise_sd
@@ -111,10 +145,13 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     if far.max() < _LEAST_GROWTH * far.min():
         return False
     if "unloading" in records.known:
-        pilot = pilot_fit(records, with_loop=True)
+        pilot = pilot_fit(records, "loop")
     square = _added(pilot.residual, previous_rows(records)) ** 2
-    clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
-    return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
+    if growth_p_value(square, far) >= _FALSE_ALARM:
+        return False
+    slope, start = np.polyfit(far, square, 1)
+    least, most = start + slope * far.min(), start + slope * far.max()
+    return bool(most > _LEAST_GROWTH**2 * least)
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -125,30 +162,18 @@ def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
     follows, square = before >= 0, float(residual @ residual)
     if not follows.any() or not square > 0.0:
         return residual
-    tied = float(residual[follows] @ residual[before[follows]]) / follows.sum()
-    rho = np.clip(tied * len(residual) / square, 0.0, _MOST_ALIKE)
+    product = float(residual[follows] @ residual[before[follows]]) / follows.sum()
+    rho = np.clip(product * len(residual) / square, 0.0, _LARGEST_CORRELATION)
     return whiten(residual, before, float(rho))
-
-
-def _variance_ratio(square: np.ndarray, deformation) -> float:
-    """Return the variance at the farthest row over that at the nearest, on a line."""
-    far = np.abs(np.asarray(deformation))
-    slope, start = np.polyfit(far, square, 1)
-    least, most = start + slope * far.min(), start + slope * far.max()
-    return float(most / least) if least > 0.0 else np.inf
 
 
 def growth_p_value(square, deformation) -> float:
     """Return how rarely squared errors of one size grow so much with deformation.
 
     The test is that of Koenker, Journal of Econometrics 17 (1981).
-
-    Args:
-        square: of each row's error, shape (n,).
-        deformation: as read [mm], shape (n,).
     """
     far = np.abs(np.asarray(deformation))
     off, left = far - far.mean(), square - square.mean()
     scale = np.sqrt((off @ off) * (left @ left))
-    tied = float(off @ left) / scale if scale > 0.0 else 0.0
-    return float(ndtr(-np.sqrt(len(far)) * tied))
+    correlation = float(off @ left) / scale if scale > 0.0 else 0.0
+    return float(ndtr(-np.sqrt(len(far)) * correlation))

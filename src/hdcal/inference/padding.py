@@ -1,10 +1,10 @@
 """Row buckets: few array lengths, so that few executables serve data of every size.
 
 JAX compiles one executable for each shape of its arguments: rows are padded to one of
-a few lengths. In sums over rows `measured` or a weight of zero leaves padding out.
+a few lengths. In sums over rows `measured` leaves padding out.
 """
 
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -36,18 +36,13 @@ def repeat_last_row(tree: Tree, size: int) -> Tree:
 
     For records: a load that is held changes nothing in the rows before it.
     """
-    return jax.tree.map(lambda array: _padded(array, size, "edge"), tree)
 
+    def padded(array) -> np.ndarray:
+        array = np.asarray(array)
+        width = [(0, size - len(array)), *[(0, 0)] * (array.ndim - 1)]
+        return np.pad(array, width, "edge")
 
-def append_zeros(tree: Tree, size: int) -> Tree:
-    """Return arrays with a common first axis, padded with rows of zeros."""
-    return jax.tree.map(lambda array: _padded(array, size, "constant"), tree)
-
-
-def _padded(array, size: int, mode: Literal["edge", "constant"]) -> np.ndarray:
-    array = np.asarray(array)
-    width = [(0, size - len(array)), *[(0, 0)] * (array.ndim - 1)]
-    return np.pad(array, width, mode)
+    return jax.tree.map(padded, tree)
 
 
 def pad_records(records: Records) -> Records:

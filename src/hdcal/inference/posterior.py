@@ -24,9 +24,7 @@ from hdcal.inference.posterior_file import (
     read_tree,
 )
 from hdcal.inference.posterior_tree import (
-    OVER_DRAWS,
     describe_case,
-    group_of,
     joined_draws,
     restore_case,
     restore_priors,
@@ -34,7 +32,6 @@ from hdcal.inference.posterior_tree import (
 )
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.structure import ModelStructure
-from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
@@ -42,6 +39,7 @@ from hdcal.physics.effect import Effect
 # diagnosis that the model is of.
 STRUCTURE, HYPOTHESIS = "structure", "hypothesis"
 _WORDS = {"static": "of the gear at rest", "dynamic": "of the moving gear"}
+Library = Mapping[str, type[Effect]]
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,11 +79,6 @@ class Posterior(Shown):
         )
 
     @property
-    def sites(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each parameter that a draw holds."""
-        return site_shapes(self.case, self.effects, self.structure)
-
-    @property
     def structure(self) -> ModelStructure:
         """What the model contains besides line and effects."""
         return ModelStructure(**self.settings[STRUCTURE])
@@ -105,12 +98,6 @@ class Posterior(Shown):
     def draws(self) -> dict[str, np.ndarray]:
         """All draws in code units by site, chains joined: [draw, …]."""
         return joined_draws(self.tree)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Number of chains, and of draws of each."""
-        sizes = group_of(self.tree, "posterior").sizes
-        return sizes["chain"], sizes["draw"]
 
     @cached_property
     def problem(self) -> Problem:
@@ -164,9 +151,7 @@ class Posterior(Shown):
         }
 
     @classmethod
-    def load(
-        cls, path: Path | str, effects: Mapping[str, type[Effect]] | None = None
-    ) -> Self:
+    def load(cls, path: Path | str, effects: Library | None = None) -> Self:
         """Read the posterior of one model.
 
         Args:
@@ -182,10 +167,7 @@ class Posterior(Shown):
 
     @classmethod
     def from_tree(
-        cls,
-        tree: xr.DataTree,
-        file: Path,
-        effects: Mapping[str, type[Effect]] | None = None,
+        cls, tree: xr.DataTree, file: Path, effects: Library | None = None
     ) -> Self:
         """Return the posterior of a tree that was read from a file, as `load`."""
         if "model" not in tree.attrs:
@@ -198,7 +180,7 @@ class Posterior(Shown):
                 problem = f"is a calibration {_WORDS[model['kind']]}"
                 remedy = f"Name the folder of a calibration {_WORDS[cls.kind]}"
                 raise InputError([Finding(str(file), problem, remedy)])
-            posterior = cls(
+            return cls(
                 case=restore_case(tree.attrs["case"], tree),
                 theory=model["theory"],
                 effects=_look_up(model["effects"], effects, file),
@@ -208,26 +190,17 @@ class Posterior(Shown):
                 checks=tuple(Check(**check) for check in model["checks"]),
                 settings=model["settings"],
             )
-            drawn = group_of(tree, "posterior")
-            for name, shape in posterior.sites.items():
-                one = drawn[name]
-                if one.dims[:2] != OVER_DRAWS or one.shape[2:] != shape:
-                    raise ValueError(f"{name} has another shape")
-                if not np.isfinite(one).all():
-                    raise ValueError(f"{name} is not finite")
         except (KeyError, ValueError, TypeError) as error:
             raise not_a_posterior(file) from error
-        return posterior
 
 
 def _look_up(
-    names: list[str], library: Mapping[str, type[Effect]] | None, file: Path
+    names: list[str], library: Library | None, file: Path
 ) -> tuple[type[Effect], ...]:
     if library is None:
         from hdcal.physics.registry import EFFECTS as library
-    remedy = "pass a library that holds it: Posterior.load(path, effects=…)"
-    unknown = [name for name in names if name not in library]
-    if unknown:
+    if unknown := [name for name in names if name not in library]:
+        remedy = "pass a library that holds it: Posterior.load(path, effects=…)"
         raise InputError(
             Finding(str(file), f"the effect '{name}' is not in the library", remedy)
             for name in unknown

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,30 +15,25 @@ from hdcal.errors import Finding, InputError, NotUsable
 FILE_NAME = "posterior.nc"
 # Attributes that hold the format, and the digest of everything else.
 FORMAT, DIGEST = "hdcal_format", "sha256"
-_VERSION, _LARGEST_FILE = 2, 1 << 32
+_LARGEST_FILE = 1 << 32
 
 
 class Kind(NamedTuple):
     """A kind of posterior file.
 
     Attributes:
-        name: of its format, without the version.
+        format: name and version of its format.
         words: its content.
         again: how it is made anew.
     """
 
-    name: str
+    format: str
     words: str
     again: str
 
-    @property
-    def format(self) -> str:
-        """Name and version of the format."""
-        return f"{self.name}/{_VERSION}"
 
-
-CALIBRATION = Kind("hdcal.posterior", "of a calibration", "calibrate again")
-FLEET = Kind("hdcal.fleet-posterior", "of a fleet", "run hdcal fleet again")
+CALIBRATION = Kind("hdcal.posterior/2", "of a calibration", "calibrate again")
+FLEET = Kind("hdcal.fleet-posterior/2", "of a fleet", "run hdcal fleet again")
 
 
 def file_of(path: Path | str) -> Path:
@@ -115,9 +111,9 @@ def digest(tree: xr.DataTree) -> str:
         for name in sorted(map(str, variables)):
             one, values = variables[name], variables[name].values
             whole.update(json.dumps([name, one.dims, one.shape]).encode())
-            plain = values.dtype.kind in "biuf"
-            text = b"" if plain else json.dumps(values.tolist()).encode()
-            whole.update(values.tobytes() if plain else text)
+            is_numeric = values.dtype.kind in "biuf"
+            texts = b"" if is_numeric else json.dumps(values.tolist()).encode()
+            whole.update(values.tobytes() if is_numeric else texts)
     return whole.hexdigest()
 
 
@@ -130,24 +126,22 @@ def not_a_posterior(path: Path, kind: Kind = CALIBRATION) -> InputError:
 def _kind(written: object) -> Kind | None:
     """Return the kind of a format of any version."""
     name = str(written).rpartition("/")[0]
-    return next((kind for kind in (CALIBRATION, FLEET) if kind.name == name), None)
+    kinds = CALIBRATION, FLEET
+    return next((kind for kind in kinds if kind.format.startswith(f"{name}/")), None)
 
 
 def _missing(path: Path) -> Finding:
-    """Return the finding for a missing file, by the answer in the same folder.
+    """Return the finding for a missing file.
 
     Raises:
-        NotUsable: the answer is of a diagnosis that failed.
+        NotUsable: the folder is of a diagnosis that failed.
     """
-    problem = "there is no such file"
-    for name in ("summary.json", "verdict.json"):
-        try:
-            answer = json.loads((path.parent / name).read_bytes())
-            problem = f"the result {answer['schema']} in this folder has no posterior"
-            failed = name == "verdict.json" and answer["status"] == "failed"
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
-        if failed:
-            reasons = "; ".join(map(str, answer.get("reasons", ())))
-            raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
-    return Finding(str(path), problem, "Name the folder of a calibration")
+    verdict = {}
+    with suppress(OSError, ValueError):
+        verdict = json.loads((path.parent / "verdict.json").read_bytes())
+    if verdict.get("status") == "failed":
+        reasons = "; ".join(map(str, verdict.get("reasons", ())))
+        raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
+    return Finding(
+        str(path), "there is no such file", "Name the folder of a calibration"
+    )

@@ -36,7 +36,6 @@ COVARIATES = {
     "specimen": "1",
     "force_sd": "N",
 }
-_OBSERVED = {"force": "N", "deformation": "mm"}
 # Fields of a case that its JSON holds as they are.
 _FIELDS = ("name", "run_labels", "specimen_labels", "data_sha256", "notes")
 _FIELDS += ("excluded", "excluded_sense")
@@ -57,12 +56,17 @@ def dataset(
         units: by name, of those that have one.
         labels: along other axes; chains and draws are numbered.
     """
-    units, variables = units or {}, {}
-    for name, values in arrays.items():
-        axes = (*sample, *_AXES.get(name, ()))[: np.ndim(values)]
-        attributes = {"units": units[name]} if name in units else {}
-        variables[name] = (axes, np.asarray(values), attributes)
-    group = xr.Dataset(variables)
+    units = units or {}
+    group = xr.Dataset(
+        {
+            name: (
+                (*sample, *_AXES.get(name, ()))[: np.ndim(values)],
+                np.asarray(values),
+                {"units": units[name]} if name in units else {},
+            )
+            for name, values in arrays.items()
+        }
+    )
     coords = {axis: np.arange(group.sizes[axis]) for axis in sample if axis != "row"}
     coords |= {axis: list(each) for axis, each in (labels or {}).items()}
     return group.assign_coords({n: v for n, v in coords.items() if n in group.sizes})
@@ -76,7 +80,7 @@ def data_groups(
     """Return the groups of the rows: what the model explains, and the other columns."""
     columns = {name: np.asarray(getattr(records, name)) for name in COVARIATES}
     explained = {name: np.asarray(getattr(records, name)) for name in observed}
-    codes = units_in(units, {**COVARIATES, **_OBSERVED})
+    codes = units_in(units, {**COVARIATES, "force": "N"})
     return {
         "observed_data": dataset(explained, OVER_ROWS, units=codes),
         "constant_data": dataset(columns, OVER_ROWS, units=codes),
@@ -124,6 +128,7 @@ def describe_case(case: Case) -> str:
     """Return a case without its rows as JSON."""
     gear = asdict(case.gear)
     sizes = gear["geometry"].items()
+    # Sizes of a spring are NaN, which is no number of JSON.
     gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes}
     fields = {name: getattr(case, name) for name in _FIELDS}
     fields |= {"load": case.units.load, "known": sorted(case.records.known)}
@@ -132,10 +137,6 @@ def describe_case(case: Case) -> str:
 
 def restore_case(text: str, tree: xr.DataTree) -> Case:
     """Return the case of a posterior.
-
-    Args:
-        text: from `describe_case`.
-        tree: groups with its rows.
 
     Raises:
         KeyError, TypeError, ValueError: text and rows do not describe a case.
@@ -150,16 +151,12 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     columns = group_of(tree, "constant_data")
     rows = {name: columns[name].values for name in COVARIATES}
     rows["force"] = group_of(tree, "observed_data")["force"].values
-    for name, column in rows.items():
-        if column.shape != (len(rows["force"]),) or not np.isfinite(column).all():
-            raise ValueError(f"{name} is no column of numbers")
-    for name in ("run", "specimen"):
-        if rows[name].max() >= len(fields[f"{name}_labels"]):
-            raise ValueError(f"a {name} has no label")
-    records = Records(**rows, known=frozenset(fields["known"]))
-    units = BY_LOAD[fields.get("load", FORCE.load)]
-    others = {name: _tuples(fields[name]) for name in _FIELDS}
-    return Case(gear=Gear(**gear), records=records, units=units, **others)
+    return Case(
+        gear=Gear(**gear),
+        records=Records(**rows, known=frozenset(fields["known"])),
+        units=BY_LOAD[fields["load"]],
+        **{name: _tuples(fields[name]) for name in _FIELDS},
+    )
 
 
 def _tuples(value: Any) -> Any:

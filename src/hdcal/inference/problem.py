@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -13,14 +14,17 @@ from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records, lies_far
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.exported import jit
-from hdcal.inference.compression import CompressedRows, keep_or_compress
-from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
-from hdcal.inference.distributions import effective_priors
-from hdcal.inference.members import integrated_kinds, member_counts
+from hdcal.inference.compression import CompressedRows, compress
+from hdcal.inference.discrepancy import (
+    Discrepancy,
+    build_discrepancy,
+    discrepancy_columns,
+)
 from hdcal.inference.padding import pad_records
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import previous_rows
 from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
@@ -29,6 +33,16 @@ from hdcal.physics.theory import THEORIES
 
 # Parameters that every model has.
 SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
+# Parameters that come in numbers: the site of each kind, and the site of the spread of
+# those that are labels in the data.
+MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "discrepancy": "gap_weights",
+}
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
+# The cost of a density grows with the cube of the number of runs or specimens.
+_MOST_MEMBERS = 200
 _base_columns = jit(linear_columns)
 
 
@@ -49,7 +63,7 @@ class Problem(Sampled):
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with a zero each, 0 = none.
         specimens: number of specimens with a stiffness each, 0 = none.
-        integrated: kinds that are integrated out, as `integrated_kinds` orders them.
+        integrated: kinds of members that are integrated out.
         centre: middle of the deformations as read [mm].
         far: whether they lie far from the origin, compared with their range.
         count: measured rows; `records` and `columns` have padding after them.
@@ -87,9 +101,20 @@ class Problem(Sampled):
         return self.discrepancy.size if self.discrepancy and is_sampled else 0
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
-        """Return the prior of each parameter given how mountings differ in a draw."""
-        mountings = self.runs if self.zero_stated else 0
-        return effective_priors(self.priors, values, mountings)
+        """Return the priors, that of the force zero given how mountings differ.
+
+        A certificate states the zero of the gauge itself. To it the mean of n tested
+        mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
+
+        Args:
+            values: parameters of one draw, or medians of them.
+        """
+        if not (self.runs and self.zero_stated):
+            return self.priors
+        middle, gauge = self.priors["force_offset"].numbers
+        of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(self.runs)
+        zero = Prior("normal", (middle, jnp.hypot(gauge, of_mean)))
+        return {**self.priors, "force_offset": zero}
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
@@ -99,13 +124,8 @@ class Problem(Sampled):
 
     @property
     def rows(self) -> Records:
-        """The kept rows, padded.
-
-        Raises:
-            ValueError: they were compressed.
-        """
-        if self.records is None:
-            raise ValueError("the rows of this problem are compressed")
+        """The kept rows, padded."""
+        assert self.records is not None, "the rows of this problem are compressed"
         return self.records
 
 
@@ -126,15 +146,6 @@ def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]
     return tuple(effect for effect in effects if not issubclass(effect, Scatter))
 
 
-def effect_sites(effects: Sequence[type[Effect]]) -> list[str]:
-    """Return the names of the parameters of effects."""
-    return [
-        f"{effect.name}.{field}"
-        for effect in without_scatter(effects)
-        for field in parameters(effect)
-    ]
-
-
 def problem_priors(
     case: Case,
     effects: Sequence[type[Effect]],
@@ -144,7 +155,7 @@ def problem_priors(
     """Return the priors of every site, K carried over to the theory in use.
 
     Args:
-        case: gear with its own priors, which win.
+        case: gear, whose stated priors win.
         effects: in the model.
         shipped: priors of every effect in the library.
         theory: which stiffness K multiplies.
@@ -155,7 +166,9 @@ def problem_priors(
     gear = case.gear
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
     table |= gear.gauge_priors
-    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors, *effect_sites(effects)]
+    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors]
+    for effect in without_scatter(effects):
+        names += [f"{effect.name}.{field}" for field in parameters(effect)]
     missing = [name for name in names if name not in table]
     if missing:
         raise InputError(
@@ -176,7 +189,7 @@ def influence_prior(case: Case, theory: Theory) -> Prior:
     """Return the prior of K carried over to a theory: K_a k_a = K_b k_b.
 
     Raises:
-        InputError: one of both is `spring`, whose modulus is another.
+        InputError: one theory is `spring`, which has another modulus.
     """
     gear = case.gear
     if (theory == SPRING) != (gear.K_theory == SPRING):
@@ -212,25 +225,43 @@ def build_problem(
     Raises:
         InputError: an effect lacks its covariates or a prior.
     """
-    check_covariates(case, effects)
+    records, reading = case.records, case_reading(case)
+    members = {
+        kind: len(getattr(case, f"{kind}_labels"))
+        for kind in MEMBER_SD
+        if kind in records.known
+    }
+    _check(case, effects, members)
     effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
-    records, reading = case.records, case_reading(case)
     form = structure or decide_structure(case, effects)
+    padded, rows = pad_records(records), len(records.force)
     leftover = build_discrepancy(records, effects) if form.with_gap else None
-    columns = np.asarray(_base_columns(pad_records(records), reading))
-    columns, keep = columns[: len(records.force)], form.rounded or bool(effects)
-    rows = keep_or_compress(records, columns, leftover, keep, form.correlated)
-    linear = set()
+    base = np.asarray(_base_columns(padded, reading))[:rows]
+    columns = discrepancy_columns(leftover, padded)
+    before = previous_rows(records) if form.correlated else None
+    blocks = None
+    if not (form.rounded or effects):
+        design = base if columns is None else np.hstack([base, columns[:rows]])
+        blocks = compress(design, records, before)
+    if before is not None:
+        extra = (0, len(padded.force) - rows)
+        before = np.pad(before, extra, constant_values=-1)
+    integrated = []
     if not (form.rounded or any(effect.mixture for effect in effects)):
         # Through an effect the force need not be linear in the stiffness.
-        linear = {"run", "discrepancy"} | ({"specimen"} if rows["blocks"] else set())
-    members = member_counts(case, form.with_gap)
+        integrated = [kind for kind in members if kind == "run" or blocks is not None]
+        integrated += ["discrepancy"] if form.with_gap else []
     problem = Problem(
         priors=without_texts(priors),
         units={},
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
+        records=padded if blocks is None else None,
+        blocks=blocks,
+        columns=columns if blocks is None else None,
+        before=before if blocks is None else None,
+        count=rows,
         discrepancy=leftover,
         step=case.gear.force_resolution,
         effects=effects,
@@ -238,32 +269,33 @@ def build_problem(
         correlated=form.correlated,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
-        integrated=integrated_kinds(case.name, members, frozenset(linear)),
+        integrated=tuple(integrated),
         zero_stated=is_stated(case.gear.priors["force_offset"]),
         centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
         far=lies_far(records),
-        **rows,
     )
     # Late: it imports this module.
     from hdcal.inference.identifiability import resolved_units
 
-    units = resolved_units(problem, records, columns, form.noise_sd)
+    units = resolved_units(problem, records, base, form.noise_sd)
     return replace(problem, units=units)
 
 
-def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
-    """Raise `InputError` where the data lack a covariate that an effect needs."""
-    findings = [
-        Finding(
-            case.name,
-            f"effect '{effect.name}' needs {need}, which these data do not have",
-            "measure it, or leave the effect out",
-        )
-        for effect in effects
-        for need in sorted(effect.needs - case.records.known)
-    ]
-    if findings:
-        raise InputError(findings)
+def _check(
+    case: Case, effects: Sequence[type[Effect]], members: Mapping[str, int]
+) -> None:
+    """Raise `InputError` where covariates are missing, or members are too many."""
+    with Findings() as findings:
+        for effect in effects:
+            for need in sorted(effect.needs - case.records.known):
+                words = f"effect '{effect.name}' needs {need}, which these data lack"
+                remedy = "measure it, or leave the effect out"
+                findings.append(Finding(case.name, words, remedy))
+        for kind, count in members.items():
+            if count > _MOST_MEMBERS:
+                words = f"{count} {kind}s are too many for one calibration"
+                remedy = f"give it {_MOST_MEMBERS} or fewer; fleet takes any number"
+                findings.append(Finding(case.name, words, remedy))
 
 
 def case_reading(case: Case) -> Reading:

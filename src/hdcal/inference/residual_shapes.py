@@ -9,6 +9,7 @@ from scipy import special
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
+from hdcal.inference.serial_correlation import whitened_products
 
 # Family-wise probability that a shape is found in pure noise.
 FALSE_ALARM = 0.01
@@ -45,13 +46,13 @@ class Structure:
 class Whitened:
     """Residuals and what could explain them, in noise sds.
 
-    Below the rows of the data stands one row for each parameter with its prior, so
-    that the fit absorbs a shape only as far as the priors let it.
+    Below the rows of the data is one row for each parameter with its prior, so that
+    the fit absorbs a shape only as far as the priors let it.
 
     Attributes:
         residual: shape (n + p,).
         absorbed: sensitivity to each parameter, shape (n + p, q).
-        shapes: what to look for, each column of shape (n + p,).
+        shapes: candidates, each column of shape (n + p,).
     """
 
     residual: np.ndarray
@@ -59,8 +60,7 @@ class Whitened:
     shapes: Shapes
 
 
-@dataclass(frozen=True)
-class Correlated:
+class Correlated(NamedTuple):
     """Noise whose neighbours may be correlated.
 
     Attributes:
@@ -206,7 +206,10 @@ def _tests(
         return []
     left = residual - basis @ (basis.T @ residual)
     table = np.column_stack([basis, *units.values(), left])
-    products, log_weight = _products(table, noise)
+    before, rho = np.full(len(residual), -1), np.zeros(1)
+    if noise is not None:
+        before, rho = noise.before, _quantiles(noise.prior)
+    products, log_weight = whitened_products(table, before, rho)
     absorbed, mixed = products[:, :size, :size], products[:, :size, size:]
     rest = products[:, size:, size:] - mixed.mT @ np.linalg.solve(absorbed, mixed)
     log_weight = log_weight - 0.5 * np.linalg.slogdet(absorbed)[1]
@@ -226,21 +229,9 @@ def _tests(
     return tests
 
 
-def _products(table: np.ndarray, noise: Correlated | None):
-    """Return inner products of the columns whitened with each ρ, and its log weight.
-
-    The weight of ρ is that of its prior times the density of the whitening.
-    """
-    if noise is None:
-        return (table.T @ table)[None], np.zeros(1)
-    rho = np.array([noise.prior.numbers[0]], float)
-    if noise.prior.family != "fixed":
-        share = (np.arange(_CORRELATIONS) + 0.5) / _CORRELATIONS
-        rho = np.minimum(frozen(noise.prior).ppf(share), _CLOSEST)
-    (follows,) = np.nonzero(noise.before >= 0)
-    now, before = table[follows], table[noise.before[follows]]
-    crossed, first = now.T @ before, np.delete(table, follows, axis=0)
-    r = rho[:, None, None]
-    rows = now.T @ now - r * (crossed + crossed.T) + r**2 * (before.T @ before)
-    volume = -0.5 * len(follows) * np.log1p(-(rho**2))
-    return first.T @ first + rows / (1.0 - r**2), volume
+def _quantiles(prior: Prior) -> np.ndarray:
+    """Return quantiles of the prior of a correlation, below one."""
+    if prior.family == "fixed":
+        return np.array([float(prior.numbers[0])])
+    share = (np.arange(_CORRELATIONS) + 0.5) / _CORRELATIONS
+    return np.minimum(frozen(prior).ppf(share), _CLOSEST)

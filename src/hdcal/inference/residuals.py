@@ -1,34 +1,42 @@
-"""What the calibrated model leaves over, and whether it has a shape."""
+"""What the calibrated model leaves over: its shapes, and whether the rest is noise."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.special import ndtr
 
+from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
 from hdcal.inference.identifiability import Linearisation, linearise
+from hdcal.inference.noise_form import growth_p_value
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
+    FALSE_ALARM,
     Correlated,
     Structure,
     Whitened,
     find_structure,
+    orthonormal,
     shapes_of,
 )
-from hdcal.inference.serial_correlation import CORRELATION, previous_rows
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.inference.values import predict_rows
 from hdcal.notebook import Shown
 from hdcal.quantities import FORCE, Quantities
 
+NEIGHBOURS, SCATTER = "neighbours", "scatter"
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
-# posterior's own.
+# of the posterior.
 _DRAWS = 200
+# Fewer rows do not show the properties of their noise.
+_LEAST_ROWS = 12
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,15 +73,15 @@ class Residuals(Shown):
 def residuals(posterior: Posterior) -> Residuals:
     """Return the residuals of a calibration and the shapes found in them."""
     problem, records = posterior.problem, posterior.case.records
+    measured, units = np.asarray(records.force), posterior.case.units
     padded = pad_records(records)
     columns = discrepancy_columns(problem.discrepancy, padded)
     every = max(len(posterior.draws["K"]) // _DRAWS, 1)
     thinned = {name: values[::every] for name, values in posterior.draws.items()}
-    fitted = np.asarray(_fit(problem, thinned, padded, columns))[: len(records.force)]
-    residual = np.asarray(records.force) - fitted
+    fitted = np.asarray(_fit(problem, thinned, padded, columns))[: len(measured)]
     centre = posterior.median
     near = linearise(problem, centre, records)
-    whitened = _whiten(posterior, centre, near, residual)
+    whitened = _whiten(posterior, near, measured - fitted)
     noise = None
     if problem.correlated:
         noise = Correlated(previous_rows(records), problem.priors[CORRELATION])
@@ -85,7 +93,6 @@ def residuals(posterior: Posterior) -> Residuals:
         records,
         near.sd,
         rounded=float(problem.step) > float(np.median(near.sd)),
-        mixed=any(effect.mixture for effect in posterior.effects),
         correlation=float(centre.get(CORRELATION, 0.0)),
     )
     return Residuals(
@@ -93,18 +100,14 @@ def residuals(posterior: Posterior) -> Residuals:
         temperature=np.asarray(records.temperature),
         direction=np.asarray(records.sense),
         run=np.asarray(records.run),
-        measured=np.asarray(records.force),
+        measured=measured,
         fitted=fitted,
-        residual=residual,
-        standardised=residual / near.sd,
-        structure=_in_words(structure, posterior.case.units),
-        noise=_in_words(faults, posterior.case.units),
-        units=posterior.case.units,
+        residual=measured - fitted,
+        standardised=(measured - fitted) / near.sd,
+        structure=tuple(replace(s, words=units.say(s.words)) for s in structure),
+        noise=tuple(replace(s, words=units.say(s.words)) for s in faults),
+        units=units,
     )
-
-
-def _in_words(found: tuple[Structure, ...], units: Quantities):
-    return tuple(replace(one, words=units.say(one.words)) for one in found)
 
 
 @jit
@@ -118,24 +121,24 @@ def _fit(problem, values, records, columns):
     return total / len(values["K"])
 
 
-def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whitened:
+def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
     """Return residuals, sensitivities and shapes in noise and prior sds."""
-    sd, priors = near.sd, posterior.problem.priors_given(centre)
-    columns, pull = [near.members], [-near.place]
+    case, centre = posterior.case, posterior.median
+    sd, priors = near.sd, posterior.effective_priors
+    columns, pull = [near.members], [*-near.place]
     for name, slope in near.slopes.items():
         mean, prior_sd = moments(priors[name], name)
         columns.append(slope[:, None] * prior_sd)
-        pull.append(np.array([(mean - centre[name]) / prior_sd]))
-    below = np.concatenate(pull)
-    case = posterior.case
+        pull.append((mean - centre[name]) / prior_sd)
     smoothed = case.screening is not None and case.screening.deformation_sd > 0.0
     reference = case.gear.reference_temperature
     shapes = shapes_of(case.records, reference, smoothed=smoothed)
+    none = np.zeros(len(pull))
     return Whitened(
-        residual=np.concatenate([residual / sd, below]),
-        absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(below))]),
+        residual=np.concatenate([residual / sd, pull]),
+        absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(pull))]),
         shapes={
-            name: (np.concatenate([column / sd, 0.0 * below]), up, down)
+            name: (np.concatenate([column / sd, none]), up, down)
             for name, (column, up, down) in shapes.items()
         },
     )
@@ -145,12 +148,122 @@ def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
     """Return a warning for each fault of the noise, for answers that rest on it.
 
     A shape of the residuals is no such fault: what is predicted has a bend for it.
-
-    Args:
-        posterior: from `calibrate`.
     """
     words = [fault.words for fault in residuals(posterior).noise]
-    alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    if alike.outcome == "warning":
-        words.append(f"{alike.words[:1].upper()}{alike.words[1:]}.")
+    correlation = correlation_check(posterior.draws, len(posterior.case.records.force))
+    if correlation.outcome == "warning":
+        words.append(f"{correlation.words[:1].upper()}{correlation.words[1:]}.")
     return tuple(words)
+
+
+def noise_faults(
+    data: Whitened,
+    records: Records,
+    sd: np.ndarray,
+    *,
+    rounded: bool,
+    correlation: float = 0.0,
+) -> tuple[Structure, ...]:
+    """Return how residuals differ from the noise that the model has.
+
+    The family-wise error of the tests is `FALSE_ALARM`.
+
+    Args:
+        data: residuals and what was absorbed, shapes that were found included.
+        records: the rows.
+        sd: noise sd of each row [N].
+        rounded: whether steps of the reading are wider than its noise; neighbours
+            then err in the same way without any correlation.
+        correlation: of neighbouring readings in the model [-].
+    """
+    if len(sd) < _LEAST_ROWS:
+        return ()
+    before = previous_rows(records)
+    follows = before >= 0
+    # Squares of correlated errors come in waves, which pass for growth.
+    left = _independent(data, before, correlation)
+    tests = [_scatter(left, records, sd)]
+    if not rounded and follows.any():
+        tests.append(_neighbours(left, before, sd, correlation))
+    adjusted = [replace(t, p_value=min(1.0, t.p_value * len(tests))) for t in tests]
+    return tuple(test for test in adjusted if test.p_value <= FALSE_ALARM)
+
+
+class _Left(NamedTuple):
+    """Independent residuals less all that was absorbed, in noise sds.
+
+    Attributes:
+        basis: orthonormal columns of all that was absorbed, (n + p, q).
+        error: with the rows of the priors below those of the data, (n + p,).
+        scaled: errors of the data's rows, of unit variance each, (n,).
+        free: degrees of freedom.
+    """
+
+    basis: np.ndarray
+    error: np.ndarray
+    scaled: np.ndarray
+    free: int
+
+
+def _independent(data: Whitened, before: np.ndarray, correlation: float) -> _Left:
+    size = len(before)
+    absorbed, residual = (
+        np.concatenate([whiten(table[:size], before, correlation), table[size:]])
+        for table in (data.absorbed, data.residual)
+    )
+    basis = orthonormal(absorbed)
+    error = residual - basis @ (basis.T @ residual)
+    kept = 1.0 - np.sum(basis[:size] ** 2, axis=1)
+    scaled = error[:size] / np.sqrt(np.maximum(kept, 1e-6))
+    return _Left(basis, error, scaled, len(error) - basis.shape[1])
+
+
+def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Structure:
+    """Test whether neighbours in a run are correlated more than in the model.
+
+    The ratio of quadratic forms has its exact mean and variance under independence,
+    as in Durbin and Watson, Biometrika 37 (1950).
+    """
+    size, (follows,) = len(sd), np.nonzero(before >= 0)
+
+    def shifted(table: np.ndarray) -> np.ndarray:
+        """Return half the row after and half the row before, within runs."""
+        moved = np.zeros_like(table)
+        moved[before[follows]] += 0.5 * table[follows]
+        moved[follows] += 0.5 * table[before[follows]]
+        return moved
+
+    moved, free, pairs = shifted(left.basis), left.free, len(follows)
+    products = left.basis.T @ moved
+    trace = -float(np.trace(products))
+    square = 0.5 * pairs - 2.0 * float(np.sum(moved**2)) + float(np.sum(products**2))
+    ratio = float(left.error @ shifted(left.error) / (left.error @ left.error))
+    mean = trace / free
+    variance = 2.0 * (free * square - trace**2) / (free**2 * (free + 2.0))
+    p = float(ndtr((mean - ratio) / np.sqrt(variance)))
+    found = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
+    times = np.sqrt((1.0 + found) / (1.0 - found))
+    rms = float(np.sqrt(np.mean((left.error[:size] * sd) ** 2)))
+    beyond = f" beyond the model's {correlation:.2f}" if correlation >= 0.005 else ""
+    words = (
+        f"The errors of neighbouring readings are correlated ({found:.2f}{beyond}): "
+        f"the intervals of stiffness and mean {{load}} are some {times:.1f} times too "
+        "narrow."
+    )
+    return Structure(NEIGHBOURS, p, found * rms, words)
+
+
+def _scatter(left: _Left, records: Records, sd: np.ndarray) -> Structure:
+    """Test whether readings scatter more the farther the gear is deformed."""
+    far, square = np.abs(np.asarray(records.deformation)), left.scaled**2
+    thirds = np.quantile(far, [1 / 3, 2 / 3])
+    near, farther = (
+        float(np.sqrt(np.mean(square[rows] * sd[rows] ** 2)))
+        for rows in (far <= thirds[0], far >= thirds[1])
+    )
+    words = (
+        f"Readings scatter more at larger {{load}}s ({near:.2g} {{N}} in the "
+        f"lower third, {farther:.2g} {{N}} in the upper one): bounds at large "
+        "{load}s are too low."
+    )
+    return Structure(SCATTER, growth_p_value(square, far), farther - near, words)

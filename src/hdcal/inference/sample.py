@@ -27,15 +27,20 @@ Progress = Callable[[int, int], None]
 # Mean acceptance aimed at; each further value is for a run with divergences.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
-# A run is extended to at most so many times the draws that were asked for.
+# A run is extended to at most so many times the requested draws.
 _LONGEST = 4
 # Draws of a chain for each effective one that is needed; a shorter run is not extended.
 _ENOUGH = 8
 # Spread of the chains' starts in posterior sds, so that R-hat can detect disagreement.
 _OVERDISPERSION = 2.0
-# Fields of the sampler's state that are kept of each draw, `adapt_state` apart.
-_KEPT = ("z", "energy", "potential_energy", "diverging", "num_steps", "accept_prob")
-_DIVERGING = _KEPT.index("diverging")
+# Statistics that are kept of each draw: ArviZ' name, and that of the sampler's state.
+_STATISTICS = {
+    "energy": "energy",
+    "lp": "potential_energy",
+    "diverging": "diverging",
+    "n_steps": "num_steps",
+    "acceptance_rate": "accept_prob",
+}
 
 
 @dataclass(frozen=True)
@@ -44,23 +49,23 @@ class Draws:
 
     Attributes:
         values: by site name, in code units.
-        energy: Hamiltonian.
-        potential: −log posterior density in unconstrained coordinates.
-        diverging: whether the trajectory diverged.
-        n_steps: leapfrog steps of the trajectory.
-        acceptance: mean acceptance probability of the trajectory.
-        step_size: adapted to `target_acceptance`.
-        target_acceptance: mean acceptance that was aimed at.
+        statistics: of the sampler, under ArviZ' names.
+        target_acceptance: mean acceptance probability that was aimed at.
     """
 
     values: dict[str, np.ndarray]
-    energy: np.ndarray
-    potential: np.ndarray
-    diverging: np.ndarray
-    n_steps: np.ndarray
-    acceptance: np.ndarray
-    step_size: np.ndarray
+    statistics: dict[str, np.ndarray]
     target_acceptance: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of chains, and of draws of each."""
+        return self.statistics["energy"].shape
+
+    @property
+    def diverged(self) -> bool:
+        """Whether any trajectory diverged."""
+        return bool(self.statistics["diverging"].any())
 
     @cached_property
     def median(self) -> dict[str, np.ndarray]:
@@ -98,7 +103,7 @@ def sample(
     for target in longer:
         run = begin(target)
         run.advance(draws, stop_if_diverging=True)
-        if not run.diverged and not (found := _extended(run, draws)).diverging.any():
+        if not run.diverged and not (found := _extended(run, draws)).diverged:
             return found
     run = begin(shortest)
     run.advance(draws)
@@ -123,11 +128,8 @@ def _extended(run: "_Run", draws: int) -> Draws:
         found = run.draws()
         values = found.values.items()
         varying = {n: v for n, v in values if v.ndim == 2 and np.ptp(v) > 0.0}
-        if (
-            not _ENOUGH * ESS_PER_CHAIN <= found.energy.shape[1] < _LONGEST * draws
-            or found.diverging.any()
-            or have_mixed(varying)
-        ):
+        may_be_longer = _ENOUGH * ESS_PER_CHAIN <= found.shape[1] < _LONGEST * draws
+        if not may_be_longer or found.diverged or have_mixed(varying):
             return found
         run.advance(draws)
 
@@ -145,7 +147,6 @@ class _Run:
             for chain in range(chains)
         ]
         self._done, self._kept = 0, []
-        self._named, self._values = 0, []
 
     def advance(self, draws: int, *, stop_if_diverging: bool = False) -> None:
         """Draw so many more from each chain, after its warm-up.
@@ -156,7 +157,7 @@ class _Run:
         """
         warmup, total = self._warmup, max(self._done, self._warmup) + draws
         while self._done < total:
-            # Stretches end with the warm-up, so that all but the last ones are alike.
+            # Stretches end with the warm-up, for few lengths.
             left = (warmup if self._done < warmup else total) - self._done
             size = {"warmup": warmup, "length": min(_STRETCH, left)}
             each = [
@@ -166,7 +167,7 @@ class _Run:
             self._states = [state for state, _ in each]
             kept = jax.device_get([kept for _, kept in each])
             if self._done >= warmup:
-                self._kept.append([np.stack(part) for part in zip(*kept, strict=True)])
+                self._kept.append(jax.tree.map(lambda *parts: np.stack(parts), *kept))
             self._done += size["length"]
             if self._progress is not None:
                 self._progress(self._done, total)
@@ -176,21 +177,15 @@ class _Run:
     @property
     def diverged(self) -> bool:
         """Whether a trajectory of the last stretch diverged."""
-        return bool(self._kept) and bool(self._kept[-1][_DIVERGING].any())
+        return bool(self._kept) and bool(self._kept[-1]["diverging"].any())
 
     def draws(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
-        parts = zip(*self._kept, strict=True)
-        standard, *statistics = (np.concatenate(part, axis=1) for part in parts)
-        new = standard[:, self._named :]
-        named = _constrain(*self._arguments, new, self._seed, self._named)
-        self._values.append(jax.device_get(named))
-        self._named = standard.shape[1]
-        named = {
-            name: np.concatenate([part[name] for part in self._values], axis=1)
-            for name in named
-        }
-        return Draws(named, *statistics, target_acceptance=self._target)
+        kept = jax.tree.map(lambda *parts: np.concatenate(parts, 1), *self._kept)
+        standard, kept["lp"] = kept.pop("standard"), -kept["lp"]
+        kept["tree_depth"] = np.ceil(np.log2(kept["n_steps"] + 1)).astype(int)
+        named = jax.device_get(_constrain(*self._arguments, standard, self._seed))
+        return Draws(named, kept, self._target)
 
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
@@ -227,8 +222,9 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
     def one(state, _):
         state = step(state)
-        kept = [getattr(state, name) for name in _KEPT]
-        return state, [*kept, state.adapt_state.step_size]
+        kept = {name: getattr(state, its) for name, its in _STATISTICS.items()}
+        size = state.adapt_state.step_size
+        return state, {**kept, "standard": state.z, "step_size": size}
 
     state = jax.tree.unflatten(structure, leaves)
     state, kept = jax.lax.scan(one, state, length=length)
@@ -236,18 +232,10 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 
 @jit
-def _constrain(problem, whitening, standard, seed, first):
-    """Return parameters by name, with draws of the members that were integrated out.
-
-    Args:
-        problem: the inference problem.
-        whitening: coordinates of the sampler.
-        standard: draws in these coordinates, (chain, draw, d).
-        seed: of the run.
-        first: number of draws of each chain before these.
-    """
+def _constrain(problem, whitening, standard, seed):
+    """Return parameters by name, with draws of the members that were integrated out."""
     _, members = jax.random.split(jax.random.key(seed))
-    place = first + jnp.arange(standard.shape[1])
+    chains, draws, _ = standard.shape
 
     def one(drawn):
         coordinates, key = drawn
@@ -256,8 +244,8 @@ def _constrain(problem, whitening, standard, seed, first):
 
     def chain(coordinates, key):
         # The key of a draw does not depend on the length of the run.
-        keys = jax.vmap(partial(jax.random.fold_in, key))(place)
-        # One draw after the other: members by the thousand would fill the memory.
+        keys = jax.vmap(partial(jax.random.fold_in, key))(jnp.arange(draws))
+        # One draw after the other: members by the hundred would fill the memory.
         return jax.lax.map(one, (coordinates, keys))
 
-    return jax.vmap(chain)(standard, jax.random.split(members, len(standard)))
+    return jax.vmap(chain)(standard, jax.random.split(members, chains))

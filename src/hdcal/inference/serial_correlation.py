@@ -43,38 +43,29 @@ def whiten(columns, before, correlation):
     return scale * columns - (correlation * gain) * follows * columns[before]
 
 
-def worth(rows: int, correlation: float) -> float:
-    """Return the number of independent readings that determine a mean as well.
-
-    1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|.
-
-    Args:
-        rows: of the run.
-        correlation: ρ, from 0 to 1.
-    """
-    return (rows - (rows - 2) * correlation) / (1.0 + correlation)
-
-
 def log_volume(following, correlation) -> Float[Array, "*r"]:
-    """Return log |de/dz| at each ρ, by NumPy where that is no array of JAX.
-
-    Args:
-        following: number of rows that follow another one.
-        correlation: ρ.
-    """
+    """Return log |de/dz| at each ρ, by NumPy where that is no array of JAX."""
     xp = jnp if isinstance(correlation, jax.Array) else np
     return 0.5 * following * xp.log1p(-(correlation**2))
 
 
-def given_before(mean, sd, error, before, correlation):
-    """Return mean and sd [N] of each row given the row before it.
+def whitened_products(
+    table: np.ndarray, before: np.ndarray, correlation: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return inner products of columns whitened with each ρ, and log |dz/de|.
+
+    Of shape (r, p, p) and (r,).
 
     Args:
-        mean: of each row [N], shape (n,).
-        sd: noise sd [N], shape (n,).
-        error: reading less its mean, in noise sds, shape (n,).
-        before: from `previous_rows`.
-        correlation: ρ, between −1 and 1.
+        table: columns in noise sds, shape (m, p); rows after those of the data are
+            independent.
+        before: from `previous_rows`, shape (n,).
+        correlation: each ρ, shape (r,).
     """
-    tied = jnp.where(before >= 0, correlation, 0.0)
-    return mean + sd * tied * error[before], sd * jnp.sqrt(1.0 - tied**2)
+    (follows,) = np.nonzero(before >= 0)
+    now, earlier = table[follows], table[before[follows]]
+    first = np.delete(table, follows, axis=0)
+    crossed, rho = now.T @ earlier, correlation[:, None, None]
+    rows = now.T @ now - rho * (crossed + crossed.T) + rho**2 * (earlier.T @ earlier)
+    products = first.T @ first + rows / (1.0 - rho**2)
+    return products, -np.asarray(log_volume(len(follows), correlation))

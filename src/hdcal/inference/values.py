@@ -1,20 +1,26 @@
-"""Mean and noise of each row, from the parameters of one draw."""
+"""Mean and noise of each row, from the parameters of one draw.
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+Gains and zeros of the gauges that a certificate states are between true and as read:
+
+    F_read = (1 + g) F + b,   ω_read = (1 + h) ω,   T_read = T + θ,
+
+with ω₀ in the reading of the deformation. The likelihood, the loss of modulus with
+temperature α, effects and leftover are in terms of what was read; E₀, K and the
+stiffness are true. What no certificate states is left out.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
-from hdcal.inference.gauges import as_read
-from hdcal.inference.members import MEMBER_SD, MEMBERS, member_counts
-from hdcal.inference.problem import SITES, Problem, effect_sites
-from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.structure import ModelStructure
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
+
+if TYPE_CHECKING:
+    from hdcal.inference.problem import Problem
 
 # Float scalars and arrays by site name.
 Values = Mapping[str, Any]
@@ -24,27 +30,48 @@ Values = Mapping[str, Any]
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
-def site_shapes(
-    case: Case, effects: Sequence[type[Effect]], structure: ModelStructure
-) -> dict[str, tuple[int, ...]]:
-    """Return the shape of each parameter that a draw of a model holds."""
-    names = ["stiffness", *SITES, *case.gear.gauge_priors, *effect_sites(effects)]
-    if structure.correlated:
-        names.append(CORRELATION)
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
-    for kind, count in member_counts(case, structure.with_gap).items():
-        scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
-        shapes |= {**dict.fromkeys(scales, ()), MEMBERS[kind]: (count,)}
-    return shapes
+def with_gains(values: Values, ratio: Any) -> Any:
+    """Return force per deformation as read from the true one."""
+    if "force_gain" in values:
+        ratio = ratio * (1.0 + values["force_gain"])
+    if "deformation_gain" in values:
+        ratio = ratio / (1.0 + values["deformation_gain"])
+    return ratio
 
 
-def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
+def where_read(values: Values, stiffness: Any) -> Any:
+    """Return the stiffness where T_ref is read from that at a true T_ref."""
+    if "temperature_offset" in values:
+        stiffness = stiffness / (1.0 - values["alpha"] * values["temperature_offset"])
+    return stiffness
+
+
+def as_read(values: Values, stiffness: Any) -> Any:
+    """Return the stiffness as read, where T_ref is read, from the true one at T_ref."""
+    return with_gains(values, where_read(values, stiffness))
+
+
+def shown(values: Values, deformation: Any, temperature: Any) -> tuple[Any, Any]:
+    """Return what the gauges show at a true deformation and temperature."""
+    if "deformation_gain" in values:
+        deformation = deformation * (1.0 + values["deformation_gain"])
+    if "temperature_offset" in values:
+        temperature = temperature + values["temperature_offset"]
+    return deformation, temperature
+
+
+def acting(values: Values, force: Any) -> Any:
+    """Return the force that acts from one that is read, zero taken off."""
+    return force / (1.0 + values["force_gain"]) if "force_gain" in values else force
+
+
+def stiffness(problem: "Problem", values: Values) -> Float[Array, ""]:
     """Return K·k_theory at T_ref, per mm read without error [N/mm]."""
     radial = values["K"] * values["E0"] * problem.unit_stiffness
     return radial * problem.reading.radial_per_read
 
 
-def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
+def member_base(problem: "Problem", values: Values, run=None, specimen=None) -> Base:
     """Return the base parameters of given runs and specimens, as read.
 
     Deviations that are not among the values (integrated out) count as zero.
@@ -70,7 +97,7 @@ def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Ba
     )
 
 
-def build_effects(problem: Problem, values: Values) -> tuple[Effect, ...]:
+def build_effects(problem: "Problem", values: Values) -> tuple[Effect, ...]:
     """Return the effects of the problem with the parameters of one draw."""
     return tuple(
         effect(**{name: values[f"{effect.name}.{name}"] for name in parameters(effect)})
@@ -79,16 +106,9 @@ def build_effects(problem: Problem, values: Values) -> tuple[Effect, ...]:
 
 
 def predict_rows(
-    problem: Problem, values: Values, records: Records, columns
+    problem: "Problem", values: Values, records: Records, columns
 ) -> tuple[Float[Array, " n"], Noise]:
-    """Return mean reading [N] and noise of rows of the tested runs and specimens.
-
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        records: the rows.
-        columns: basis of the discrepancy at the rows, or None.
-    """
+    """Return mean reading [N] and noise of rows of the tested runs and specimens."""
     base = member_base(problem, values, records.run, records.specimen)
     mean, noise = predict_reading(
         base, build_effects(problem, values), records, problem.reading

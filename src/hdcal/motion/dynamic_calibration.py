@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import jax
 import numpy as np
@@ -13,7 +14,6 @@ from hdcal.errors import Finding, Findings, InputError
 from hdcal.exported import jit
 from hdcal.inference.assembly import (
     MOST_LOG_LIKELIHOODS,
-    Specifics,
     assemble,
     run_settings,
 )
@@ -88,7 +88,7 @@ def calibrate_dynamic(
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     sampled = sample(problem, mode, seed, progress=progress, **size)
     specifics = _specifics(problem, sampled, rival)
-    parts = assemble(case, priors, problem, sampled, specifics, seed)
+    parts = assemble(case, priors, problem, sampled, seed=seed, **specifics)
     settings = {"seed": seed, **size, "with_gap": False, **run_settings(sampled, began)}
     return DynamicPosterior(case, theory, acting, priors, *parts, settings)
 
@@ -129,18 +129,18 @@ def _check_record(case: Case) -> None:
             find("gives an sd of the force", remedy)
 
 
-def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> Specifics:
+def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> dict[str, Any]:
     """Return what the dynamic model adds to what every calibration has."""
-    place = np.unravel_index(np.argmin(sampled.potential), sampled.potential.shape)
+    place = np.unravel_index(np.argmax(sampled.statistics["lp"]), sampled.shape)
     best = {name: values[place] for name, values in sampled.values.items()}
     free = [name for name, prior in problem.priors.items() if prior.family != "fixed"]
     free = {name: best[name] for name in free if name != "deformation_sigma"}
     slopes, sd = _slopes(problem, best, free), best["deformation_sigma"]
     by_row = {}
-    if sampled.energy.size * problem.count <= MOST_LOG_LIKELIHOODS:
+    if np.prod(sampled.shape) * problem.count <= MOST_LOG_LIKELIHOODS:
         each = np.asarray(_pointwise(problem, sampled.values))
         by_row["deformation"] = each[..., : problem.count]
-    return Specifics(
+    return dict(
         log_likelihood=by_row,
         sensitivities={
             n: np.asarray(s)[: problem.count] / sd for n, s in slopes.items()

@@ -21,7 +21,6 @@ from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
-from hdcal.inference.gauges import where_read, with_gains
 from hdcal.inference.likelihood import log_likelihood
 from hdcal.inference.model import sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
@@ -34,7 +33,7 @@ from hdcal.inference.problem import (
     without_texts,
 )
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.values import Values
+from hdcal.inference.values import Values, where_read, with_gains
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.loops import CoulombFriction
@@ -221,11 +220,6 @@ class DynamicPosterior(Posterior):
     """
 
     kind: ClassVar[str] = "dynamic"
-
-    @property
-    def sites(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each parameter of a draw."""
-        return dict.fromkeys(self.priors, ())
 
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:

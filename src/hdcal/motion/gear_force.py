@@ -7,8 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hdcal.errors import InputError
-from hdcal.inference.members import MEMBERS
-from hdcal.inference.problem import without_scatter
+from hdcal.inference.problem import MEMBERS, without_scatter
 from hdcal.inference.values import Values
 from hdcal.physics.theory import Scalar
 from hdcal.prediction import conditions

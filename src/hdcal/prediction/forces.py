@@ -10,9 +10,8 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference.gauges import acting, shown
 from hdcal.inference.problem import Problem
-from hdcal.inference.values import Values, build_effects, member_base
+from hdcal.inference.values import Values, acting, build_effects, member_base, shown
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 

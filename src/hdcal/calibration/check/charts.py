@@ -77,12 +77,7 @@ def _kept(found: Screening) -> Iterator[Points]:
 
 
 def left_out(found: Screening, segments: Iterable[int] = _DRAWN) -> Iterator[Points]:
-    """Yield the rows that were left out, as crosses.
-
-    Args:
-        found: the screening.
-        segments: of which rows are drawn.
-    """
+    """Yield the rows that were left out, as crosses."""
     rows = ~found.kept & np.isin(found.segment, [*segments])
     yield from _segments(found, rows, "X", "left out: ")
 

@@ -8,7 +8,7 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
 from hdcal.calibration.check.screened import Screened, StraightRange, screened
-from hdcal.calibration.straight_part import takes_straight_part
+from hdcal.calibration.straight_line import takes_straight_part
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_file.schema import certificates_in

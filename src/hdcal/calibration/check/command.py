@@ -1,14 +1,19 @@
 """`hdcal check`: read and validate DATA, and nothing else."""
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdcal.calibration.check.gears import read_whole
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import case_options, force_option, json_option
+from hdcal.cli.options import (
+    case_options,
+    force_option,
+    json_option,
+    read_given,
+    without_meaning,
+)
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
@@ -47,7 +52,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     kind = "svg" if str(plot).lower().endswith(".svg") else "png"
     places = {}
     with console.wrong:
-        case = read_whole(console, given)
+        case = _read(console, given)
         if write_gear and case is not None and UNSIZED not in case.notes:
             words = "writes a gear file where there is none, and one was read here"
             raise InputError([Finding("write_gear", words, "Edit that one")])
@@ -85,3 +90,23 @@ def _gear_file(case: "Case") -> str:
     measured = {"reference_temperature_C": case.gear.reference_temperature}
     named = {"name": case.name, "theory": case.gear.theory}
     return gear_text(named, measured, case.columns)
+
+
+def _read(console: Console, given: dict[str, Any]) -> "Case | None":
+    """Read a case, or a folder with a file for each gear as one case.
+
+    Args:
+        console: of the command; it collects the findings.
+        given: values of `case_options`.
+    """
+    from hdcal.data.measurements.folder import read_gear_folder
+    from hdcal.data.measurements.gear_files import gear_files
+
+    is_case = given["specimen"] is not None or given["columns"] is None
+    if is_case or not gear_files(given["data"]):
+        return read_given(console, **given)
+    console.wrong += without_meaning(["sheet"], "a folder of gears")
+    names = "data", "gear", "columns", "theory", "reading", "encoding", "range"
+    how = {name: given[name] for name in names}
+    found = console.wrong.attempt(read_gear_folder, **how)
+    return None if found is None else found[0]

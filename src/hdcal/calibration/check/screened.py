@@ -1,17 +1,18 @@
 """What the screening of a record found, as part of a result."""
 
 import numpy as np
+from pydantic import Field
 
 from hdcal.report.item import Count, Item, Words
 from hdcal.screening.result import SEGMENTS, Screening
 
 
-class ScreenedFinding(Item):
+class ScreenedFinding(Item, from_attributes=True):
     """A finding of the screening: what it is, where, how large, and what was done."""
 
     kind: str
-    rows: str
-    row_count: Count
+    rows: str = Field(validation_alias="where")
+    row_count: Count = Field(validation_alias="count")
     size: float
     unit: str
     action: str
@@ -48,28 +49,14 @@ def screened(found: Screening | None) -> Screened | None:
     if found is None:
         return None
     part, rows = found.straight, np.bincount(found.segment, minlength=len(SEGMENTS))
-    straight = None
-    if part is not None:
-        ends = part.low, part.high
-        straight = StraightRange(
-            deformation_mm=ends,
-            stiffness_N_per_mm=part.slope,
-            standard_error_N_per_mm=part.slope_sd,
-            whole=part.whole,
-        )
+    straight = part and StraightRange(
+        deformation_mm=(part.low, part.high),
+        stiffness_N_per_mm=part.slope,
+        standard_error_N_per_mm=part.slope_sd,
+        whole=part.whole,
+    )
     return Screened(
-        findings=tuple(
-            ScreenedFinding(
-                kind=one.kind,
-                rows=one.where,
-                row_count=one.count,
-                size=one.size,
-                unit=one.unit,
-                action=one.action,
-                words=one.words,
-            )
-            for one in found.observations
-        ),
+        findings=tuple(map(ScreenedFinding.model_validate, found.observations)),
         segments={n: int(k) for n, k in zip(SEGMENTS, rows, strict=True) if k},
         working_range=found.working_range,
         straight_part=straight,

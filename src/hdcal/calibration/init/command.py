@@ -5,7 +5,6 @@ import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -89,7 +88,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
 
     tables = {"name": Path(folder).resolve().name, **stated}
     if str(tables["material"]).endswith(".toml"):
-        # A gear file names another file as seen from its own folder.
+        # A gear file names another file relative to its folder.
         tables["material"] = os.path.abspath(str(tables["material"]))
     case = None
     with console.wrong:
@@ -152,29 +151,16 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
     Raises:
         InputError: one of them is there already, or cannot be written.
     """
-    from hdcal.report.saving import Target
-
-    made = not folder.exists()
-    if made and not folder.parent.is_dir():
-        words = "its parent folder does not exist"
-        raise InputError([Finding(str(folder), words, "Make that first")])
-    if not made and not folder.is_dir():
-        raise InputError([Finding(str(folder), "is a file", "Name a folder")])
     if there := [name for name in files if (folder / name).exists()]:
         words = f"holds {' and '.join(there)} already"
         raise InputError([Finding(str(folder), words, "Name another folder")])
-    if made:
-        folder.mkdir()
+    if not folder.parent.is_dir():
+        words = "its parent folder does not exist"
+        raise InputError([Finding(str(folder), words, "Make that first")])
     try:
-        with ExitStack() as held:
-            targets = {
-                name: held.enter_context(Target(str(folder / name), beginning=b""))
-                for name in files
-            }
-            for name, content in files.items():
-                with targets[name].filled() as path:
-                    path.write_bytes(content)
-    except BaseException:
-        if made and not any(folder.iterdir()):
-            folder.rmdir()
-        raise
+        folder.mkdir(exist_ok=True)
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
+    except OSError as error:
+        words = f"cannot be written ({error.strerror})"
+        raise InputError([Finding(str(folder), words, "Name another folder")]) from None
