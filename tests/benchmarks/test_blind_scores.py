@@ -92,48 +92,6 @@ def test_first_effect_set_and_classes():
     assert tables([tie, pair])["kind"].keys() == {"effect", "composite"}
 
 
-def test_a_score_below_its_target_is_met_where_its_interval_reaches_it():
-    cases = [scored({"slack": 1.0})] * 9 + [scored({"leak": 1.0})]
-    row = rows(cases)["true effect most probable, r = 1, rich loading"]
-    assert row.found.value == 0.9 and row.met
-    row = rows(cases * 40)["true effect most probable, r = 1, rich loading"]
-    assert row.met is False
-
-
-def test_an_incomplete_library():
-    away = {"withheld": ("slack", "stop")}
-    stated, beside = (Cause(("leak",), 0.9),), Cause((OUTSIDE,), 0.8)
-    cases = [
-        scored({"leak": 1.0}, classes=stated, **away),
-        scored({"leak": 1.0}, classes=stated, outside=beside, **away),
-        scored({"leak": 1.0}, ("hum",), "outside", outside=beside),
-        scored({"leak": 1.0}, ("hum",), "outside", 0.5, outside=beside),
-    ]
-    # The curve of another effect coincides with that of the one withheld.
-    like = scored({"leak": 1.0}, r=2.0, classes=stated, **away)
-    share_of = {"classes": (Cause(("slack",), 0.6, (0.5, 0.4, 0.6)),)}
-    whole = scored({"slack": 1.0}, kind="composite", **share_of)
-    other = scored({"slack": 1.0}, kind="composite", r=2.0, **share_of)
-    closable = {whole.label.case: {"slack": 0.45}, other.label.case: {"slack": 0.7}}
-    closable[like.label.case] = {"leak": 0.7}
-    found = rows([*cases, like, whole, other], closable)
-    words = "true effect withheld: a class of another curve stated at 90 %, alone"
-    assert (found[words].found.value, found[words].found.n) == (1 / 3, 3)
-    words = "outside the library, r ≥ 1: stated to act, or the effect with its share"
-    assert (found[words].found.value, found[words].found.n) == (2 / 3, 3)
-    words = "… of an effect beside something outside"
-    assert (found[words].found.value, found[words].found.n) == (0.5, 2)
-    # A withheld effect cannot be right, and does not count.
-    assert found["of classes stated at 90 %, right"].found.n == 2
-
-
-def test_the_size_of_the_gap():
-    held = scored({"slack": 1.0}, curve=(0.3, -0.4), gap_N=(0.4, 0.3, 0.5))
-    missed = scored({"slack": 1.0}, curve=(0.3, -0.4), gap_N=(0.4, 0.36, 0.5))
-    row = rows([held, missed])["interval holds the rms of the gap, r ≥ 0.5"]
-    assert row.found.value == 0.5
-
-
 def test_calibration_of_the_calibrated_and_of_the_overconfident():
     rng = np.random.default_rng(4)
     stated = rng.uniform(0.05, 0.95, 10_000)
