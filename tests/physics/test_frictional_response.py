@@ -90,9 +90,8 @@ def test_a_held_gear_breaks_loose_when_the_force_exceeds_the_friction():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("speed", [0.0, 3.0])
-def test_gradients_and_hessians_are_those_of_differences(speed: float):
-    start = HELD + np.array([0.003, speed])
+def test_gradients_and_hessians_are_those_of_differences():
+    start = HELD + np.array([0.003, 3.0])
     at = jnp.array([MASS, DAMPING, STIFFNESS, 1.0])
 
     def size(parts):

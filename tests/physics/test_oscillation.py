@@ -1,7 +1,5 @@
 """The integrated motion is that of the textbook, and of its exact linear twin."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +11,6 @@ from hdcal.data.records import Geometry
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.dynamics import (
     Oscillator,
-    damping_ratio,
     integrate,
     natural_frequency,
     ring_mass,
@@ -27,7 +24,7 @@ XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
 MASS, STIFFNESS, FORCE = 4e-5, 200.0, 80.0
 PACE = np.sqrt(STIFFNESS / MASS)
 TIMES = np.linspace(0.0, 0.05, 401)
-RATIOS = [0.0, 0.015, 0.3, 1.0, 2.5]
+RATIOS = [0.0, 0.3, 1.0, 2.5]
 
 
 def gear(ratio: float, effects=(), reading=None) -> Oscillator:
@@ -96,21 +93,14 @@ def test_a_step_is_answered_as_in_the_textbook(ratio):
     assert worst(exact, expected) < 1e-11
 
 
-@pytest.mark.parametrize("ratio", [0.015, 0.3, 2.5])
-@pytest.mark.parametrize("frequency", [5.0, 350.0, 900.0])
+@pytest.mark.parametrize(("ratio", "frequency"), [(0.015, 350.0), (2.5, 5.0)])
 def test_a_sine_is_answered_as_in_the_textbook(ratio, frequency):
     expected = sine_response(ratio, frequency, TIMES)
     found = move(gear(ratio), sine(frequency), TIMES)[:, 0]
     assert worst(found, expected) < 1e-7
 
 
-def test_the_textbook_notices_another_mass():
-    heavier = replace(gear(0.015), mass=1.001 * MASS)
-    found = move(heavier, Step(FORCE), TIMES)[:, 0]
-    assert worst(found, step_response(0.015, TIMES)) > 1e-3
-
-
-@pytest.mark.parametrize("ratio", [0.015, 1.0, 2.5])
+@pytest.mark.parametrize("ratio", [0.015, 1.0])
 def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     rng = np.random.default_rng(1)
     time = np.sort(rng.uniform(0.0, 0.05, 80))
@@ -122,21 +112,6 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
 
 
-def test_the_exact_response_has_exact_gradients_through_critical_damping():
-    time, force = np.linspace(0.0, 0.02, 50), np.linspace(0.0, 30.0, 50)
-
-    @jax.jit
-    def end(ratio):
-        damping = 2.0 * ratio * jnp.sqrt(STIFFNESS * MASS)
-        linear = LinearGear(MASS, damping, STIFFNESS)
-        return linear_response(linear, time, force, jnp.array([0.1, 0.0]))[-1, 0]
-
-    slope, h = jax.jit(jax.grad(end)), 1e-5
-    for ratio in (0.02, 1.0, 3.0):
-        difference = float(end(ratio + h) - end(ratio - h)) / (2.0 * h)
-        assert float(slope(ratio)) == pytest.approx(difference, rel=1e-6)
-
-
 def test_a_sweep_passes_through_its_frequencies():
     sweep = Chirp(1.0, 10.0, 50.0, 2.0)
     # The phase grows by the mean frequency times the duration: sixty turns.
@@ -146,22 +121,20 @@ def test_a_sweep_passes_through_its_frequencies():
     assert np.diff(near)[0] / -1e-6 == pytest.approx(2.0 * np.pi * 50.0, rel=1e-3)
 
 
+MOTIONS = {
+    "step": (Step(FORCE), 0.05, 800),
+    "0.1 Hz": (sine(0.1), 2.6, 40_000),
+    "5 Hz": (sine(5.0), 0.3, 5_000),
+    "100 Hz": (sine(100.0), 0.05, 10_000),
+    "350 Hz": (sine(350.0), 0.05, 40_000),
+}
+
+
 @pytest.mark.parametrize("friction", slice_of([2.0, 20.0, 100.0], [20.0]))
-@pytest.mark.parametrize(
-    ("force", "end", "rows"),
-    [
-        (Step(FORCE), 0.05, 800),
-        (sine(0.1), 2.6, 40_000),
-        (sine(5.0), 0.3, 5_000),
-        (sine(100.0), 0.05, 10_000),
-        (sine(350.0), 0.05, 40_000),
-    ],
-    ids=["step", "0.1 Hz", "5 Hz", "100 Hz", "350 Hz"],
-)
-def test_dry_friction_sticks_and_slips_as_in_the_closed_form(
-    friction, force, end, rows
-):
+@pytest.mark.parametrize("name", slice_of(MOTIONS, ["step", "0.1 Hz"]))
+def test_dry_friction_sticks_and_slips_as_in_the_closed_form(friction, name):
     """To 3 % of f/k, the range in which friction holds a gear without load."""
+    force, end, rows = MOTIONS[name]
     rubbed = gear(0.015, (EFFECTS["coulomb_friction"](force=friction),))
     times = np.linspace(0.0, end, 201)
     found = move(rubbed, force, times)[:, 0]
@@ -195,14 +168,6 @@ def test_hardening_raises_the_frequency_and_keeps_the_energy():
     assert y.min() > -1e-3
     assert worst(energy, FORCE * y) < 2e-3
     assert y.max() < step_response(0.0, TIMES).max() - 0.05
-
-
-def test_a_diametral_reading_has_the_same_frequency():
-    half = gear(0.015, (), Reading(0.5, 20.0))
-    k = float(half.stiffness)
-    assert k == pytest.approx(0.5 * STIFFNESS)
-    assert natural_frequency(0.5 * MASS, k) == pytest.approx(PACE / (2.0 * np.pi))
-    assert damping_ratio(0.5 * MASS, 0.5 * half.damping, k) == pytest.approx(0.015)
 
 
 def test_the_mass_of_the_ring_is_rayleighs():

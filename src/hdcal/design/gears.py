@@ -25,8 +25,7 @@ from hdcal.design.gear_forces import (
 )
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
-from hdcal.physics.profile import peak_stress
-from hdcal.physics.theory import THEORIES
+from hdcal.physics.theory import THEORIES, peak_stress
 
 Sizes = Mapping[str, Any]
 

@@ -16,7 +16,7 @@ from hdcal.design.gear_forces import SIZES, Models
 from hdcal.design.gears import Gears, draw_gears
 from hdcal.design.result import DesignResult, shared_fields
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.physics.profile import peak_stress
+from hdcal.physics.theory import peak_stress
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Item
 
