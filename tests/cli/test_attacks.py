@@ -91,8 +91,11 @@ def attack_gear(rng: random.Random, targets: Path) -> list[str]:
         lines[line] = rng.choice([*new, f"[{key}]", "", f"priors.{key} = 1"])
     if rng.random() < 0.5:
         family, one, other = rng.choice(
-            [("normal", "mean", "sd"), ("lognormal", "median", "log_sd")]
-            + [("uniform", "low", "high"), ("beta", "a", "b"), ("fixed", "value", "x")]
+            [
+                *(("normal", "mean", "sd"), ("lognormal", "median", "log_sd")),
+                *(("uniform", "low", "high"), ("beta", "a", "b")),
+                ("fixed", "value", "x"),
+            ]
         )
         unit = rng.choice(["1", "mm", "GPa", "N", "1/K", "dB"])
         numbers = f"{one} = {rng.choice(NUMBERS)}, {other} = {rng.choice(NUMBERS)}"
