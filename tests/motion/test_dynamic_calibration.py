@@ -72,15 +72,12 @@ def recovered(seeds, **priors) -> tuple[dict[str, int], float]:
 
 
 @pytest.mark.thorough
-def test_a_few_seeds_are_recovered():
-    count, p = recovered(range(4))
-    assert min(count.values()) >= 3 and p > LEVEL, (count, p)
-
-
-@pytest.mark.slow
-def test_twenty_seeds_are_recovered():
-    count, p = recovered(range(20))
-    assert min(count.values()) >= 16 and p > LEVEL, (count, p)
+@pytest.mark.parametrize(
+    ("seeds", "least"), [(4, 3), pytest.param(20, 16, marks=pytest.mark.slow)]
+)
+def test_the_truth_is_recovered(seeds: int, least: int):
+    count, p = recovered(range(seeds))
+    assert min(count.values()) >= least and p > LEVEL, (count, p)
 
 
 @pytest.mark.thorough
@@ -93,14 +90,11 @@ def test_a_wrong_prior_is_flagged_by_the_same_count():
     assert count["mass"] == count["stiffness"] == 0 and p < LEVEL
 
 
-def test_a_good_record_passes(posterior):
+def test_a_good_record_has_a_result_with_the_numbers_of_the_draws(posterior):
     assert posterior.usable, posterior.reasons
     drivers = {name: d.driven_by for name, d in posterior.diagnoses.items()}
     assert drivers["mass"] == drivers["damping_ratio"] == "data"
     assert drivers["alpha"] == drivers["E0"] == "prior"
-
-
-def test_a_result_has_the_numbers_of_the_draws(posterior):
     found = dynamic_calibration_of(posterior)
     obeys(found.to_dict(), DynamicCalibration)
     frequency = np.sqrt(195.0 / TRUTH["mass"]) / (2.0 * np.pi)
@@ -163,17 +157,6 @@ def test_a_record_that_warms_determines_alpha():
     alpha = found.draws["alpha"]
     assert found.diagnoses["alpha"].driven_by == "data"
     assert abs(alpha.mean() - ALPHA) < 3.3 * alpha.std() < ALPHA
-
-
-@pytest.mark.thorough
-def test_a_window_of_a_long_record_leads_to_the_same_mode(monkeypatch):
-    problem = linear_problem(moving_case(0, rows=600))
-    whole, _ = highest_peak(problem)
-    monkeypatch.setattr(mode_search, "_WINDOW", 150)
-    part, check = highest_peak(problem)
-    assert check.outcome == "passed"
-    for name, centre in whole.centre.items():
-        np.testing.assert_allclose(part.centre[name], centre, atol=1e-3, err_msg=name)
 
 
 def test_frequencies_that_fit_alike_fail_the_result():
@@ -249,7 +232,7 @@ def test_a_record_of_another_kind_is_refused(columns, labels, words):
         calibrate_dynamic(spoiled)
 
 
-def test_every_fault_is_reported_at_once():
+def test_a_case_that_does_not_suit_the_model_is_refused():
     case = moving_case(0)
     with pytest.raises(InputError) as caught:
         calibrate_dynamic(replace(case, records=make_records(np.linspace(0, 0.1, 8))))

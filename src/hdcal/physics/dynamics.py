@@ -149,6 +149,11 @@ def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     return jnp.sqrt(stiffness / mass) / (2.0 * jnp.pi)
 
 
+def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
+    """Return ζ = c/(2√(k m)); 1 is critical damping [-]."""
+    return damping / (2.0 * jnp.sqrt(stiffness * mass))
+
+
 class IntegratedMotion(NamedTuple):
     """A motion over time.
 
