@@ -105,7 +105,7 @@ ASKED = {
     "unloading": (friction, AT | {"direction": "down", "given_force": 80.0}),
     "drifting zero": (lambda: looped(thermal_zero_drift__slope=0.1), AT | WARM),
 }
-QUICK = ("rounded", "specimens", "averaged", "leftover", "unloading")
+QUICK = ("rounded", "averaged", "leftover", "unloading")
 
 
 @pytest.mark.parametrize("name", slice_of(ASKED, QUICK))

@@ -20,7 +20,7 @@ def rows(count: int, rho: float, seed: int = 3, width: float = 0.5):
     return deformation, 205.0 * deformation - 0.4 + 0.6 * correlated(rng, rho, count)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.6, -0.3])
+@pytest.mark.parametrize("rho", [0.0, 0.6])
 def test_each_draw_is_a_batch_fit_with_its_marginal_likelihood(rho):
     """Generalised least squares and a multivariate Student density, the slow twin."""
     tracker = with_correlation(Tracker(single()), rho)
@@ -64,7 +64,7 @@ def test_each_draw_is_a_batch_fit_with_its_marginal_likelihood(rho):
 def test_rows_that_hardly_differ_keep_their_digits():
     tracker = with_correlation(Tracker(single()), 0.0)
     before = tracker._bank
-    deformation, force = rows(20_000, 0.0, width=1e-6)
+    deformation, force = rows(6_000, 0.0, width=1e-6)
     tracker.follow(
         [
             StreamReading(deformation=x, force=y)
@@ -93,7 +93,7 @@ def test_blocks_of_any_size_give_the_same_answers():
             assert other[name] == pytest.approx(answer[name], rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("freedom", [4.0, 20.0, 1e6])
+@pytest.mark.parametrize("freedom", [4.0, 1e6])
 def test_scores_of_a_mixture_are_normal_quantiles(freedom):
     bank = tree_at(
         lambda bank: bank.log_weight,
@@ -132,13 +132,3 @@ def test_repeated_readings_add_up_to_what_their_mean_says(noise):
     assert float(_rounding_weight(bank, 200)[0]) == pytest.approx(1.0)
     other = tree_at(lambda bank: bank.epoch, bank, bank.epoch + 1)
     assert float(_rounding_weight(other, 100)[0]) == pytest.approx(1.0)
-
-
-def test_the_repeated_part_is_that_of_simulated_readings():
-    rng, place = np.random.default_rng(0), np.linspace(0.0, STEP, 200, endpoint=False)
-    for noise in (0.01, 0.2, 0.3):
-        force = place[:, None] + noise * rng.standard_normal((200, 4000))
-        error = STEP * np.round(force / STEP) - place[:, None]
-        expected = np.var(error.mean(axis=1)) / np.var(error)
-        part = float(_rounding_weight(rounded_bank(noise), 0)[1])
-        assert part == pytest.approx(expected, abs=0.1)
