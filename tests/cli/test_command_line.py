@@ -11,8 +11,6 @@ import pytest
 from commands import MAIN, XB1, Hdcal
 from schema_checks import obeys
 
-from hdcal.__main__ import REMOVED
-from hdcal.__main__ import hdcal as root
 from hdcal.calibration.check.check import Check
 from hdcal.calibration.effects.effects import Effects
 from hdcal.physics.registry import EFFECTS
@@ -115,7 +113,6 @@ def test_bad_input_gives_every_finding_and_writes_nothing(here: Hdcal, case: Pat
         ["predict", XB1 / "data.csv", "--deformation", "0.1"],
         ["check", "a" * 4096],
         ["check", "a\nb"],
-        *([name] for name in REMOVED),
     ],
 )
 def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Path):
@@ -127,12 +124,6 @@ def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Pat
     keys = {"file", "row", "column", "problem", "remedy"}
     assert as_json["status"] == "error" and as_json["findings"]
     assert all(finding.keys() == keys for finding in as_json["findings"])
-
-
-def test_a_removed_command_names_its_replacement(here: Hdcal):
-    for name, replacement in REMOVED.items():
-        assert name not in root.commands
-        assert replacement in " ".join(here(name).stderr.split())
 
 
 def test_text_of_a_file_sends_no_control_characters(here: Hdcal, case: Path):

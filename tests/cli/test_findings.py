@@ -5,7 +5,6 @@ import pytest
 from commands import XB1, Hdcal
 from moving import still_posterior
 
-from hdcal.cli import progress
 from hdcal.cli.command import command
 from hdcal.data.measurements.measurements import read_measurements
 from hdcal.errors import Finding, InputError
@@ -100,14 +99,3 @@ def test_findings_escape_control_characters_and_cut_in_the_middle(tmp_path):
     with pytest.raises(InputError) as caught:
         read_measurements(tmp_path / "data.csv")
     assert r"'\x1b[2J' is not a number" in str(caught.value)
-
-
-@pytest.mark.parametrize(("seconds", "shares"), [(10.0, (25, 50, 75)), (0.1, ())])
-def test_progress_of_a_long_task_in_a_log(capsys, monkeypatch, seconds, shares):
-    clock = iter(range(1_000))
-    monkeypatch.setattr(progress.time, "monotonic", lambda: seconds * next(clock))
-    with progress.progress_bar("sampling") as report:
-        for done in range(0, 101, 5):
-            report(done, 100)
-    lines = capsys.readouterr().err.splitlines()
-    assert lines == [f"hdcal: sampling, {share} % done" for share in shares]

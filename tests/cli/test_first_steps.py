@@ -1,8 +1,6 @@
 """The first steps with new files: check, plot, gear file, init, help, completion."""
 
-import io
 import json
-import sys
 import tomllib
 from pathlib import Path
 
@@ -11,13 +9,11 @@ import pytest
 from commands import Hdcal
 
 import hdcal as library
-from hdcal.cli.here import what_next
 from hdcal.data.resources import priors_folder
 
 LOG = "Weg [mm];Kraft [kN]\n" + "".join(f"0,{k}5;0,0{k}1\n" for k in range(1, 8))
 SIZES = ["--wall", ".68", "--radius", "40", "--length", "70"]
 BEGUN = [*SIZES, "--deformation", "diametral"]
-OPEN = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
 
 
 @pytest.fixture
@@ -25,29 +21,6 @@ def log(tmp_path: Path) -> Path:
     path = tmp_path / "log.csv"
     path.write_text(LOG)
     return path
-
-
-class Terminal(io.StringIO):
-    """A terminal with a text that is typed."""
-
-    def isatty(self) -> bool:
-        return True
-
-
-def test_an_open_question_of_the_gear_file_is_asked_on_a_terminal(
-    here: Hdcal, log: Path, monkeypatch
-):
-    (log.parent / "gear.toml").write_text(OPEN + 'material = "steel"\n')
-    assumed = "the deformation is radial"
-    assert assumed in here("check", log).stdout
-    monkeypatch.setattr("sys.stdin", Terminal("diametral\n"))
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    done = here("check", log)
-    assert done.returncode == 0 and assumed not in done.stdout
-    # A program is not asked.
-    monkeypatch.setattr("sys.stdin", Terminal(""))
-    notes = json.loads(here("check", log, "--json").stdout)["notes"]
-    assert any(assumed in note for note in notes)
 
 
 def test_check_writes_a_gear_file_of_what_it_read(here: Hdcal, log: Path):
@@ -148,24 +121,6 @@ def test_init_refuses_an_impossible_folder(here: Hdcal, log: Path):
     for folder in (log.parent / "no" / "rig", log):
         assert here("init", folder, *BEGUN).returncode == 2
     assert log.read_text() == LOG
-
-
-def test_hdcal_alone_lists_commands_for_the_files_of_this_folder(here: Hdcal, log):
-    for name, file in (("rig", "data.csv"), ("old result", "posterior.nc")):
-        (log.parent / name).mkdir()
-        (log.parent / name / file).write_text(LOG)
-    done = here()
-    assert done.returncode == 2 and not done.stdout
-    assert "Usage: hdcal" in done.stderr
-    for step in ("check log.csv\n", "calibrate rig --out result\n", "'old result' "):
-        assert step in done.stderr
-    empty = log.parent / "rig" / "empty"
-    empty.mkdir()
-    assert not list(what_next(empty)) and not list(what_next(empty / "gone"))
-    for odd in ("x;reboot.csv", "-o.csv"):
-        (empty / odd).write_text("")
-    steps = {"hdcal check 'x;reboot.csv'", "hdcal check ./-o.csv"}
-    assert {*what_next(empty)} == steps
 
 
 def test_pages_and_completion_in_the_terminal(hdcal: Hdcal, here: Hdcal):

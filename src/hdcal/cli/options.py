@@ -1,6 +1,5 @@
 """Options that several commands share."""
 
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
@@ -116,39 +115,12 @@ def take_reading(settings: dict) -> dict:
 
 
 def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
-    """Read the case that `case_options` named; the console collects what is wrong.
-
-    On a terminal it asks for what the gear file leaves open.
-    """
+    """Read the case that `case_options` named; the console collects what is wrong."""
     from hdcal.data.reading import read_case
 
     if columns is None:  # The console has that finding already.
         return None
-    read = partial(read_case, columns=columns)
-    case = console.wrong.attempt(read, data, gear, **how)
-    reading = asked_reading(console, case)
-    if reading is None:
-        return case
-    how["reading"] = reading
-    return console.wrong.attempt(read, data, gear, **how)
-
-
-def asked_reading(console: Console, case: "Case | None") -> str | None:
-    """Ask on a terminal whether the deformation is radial or diametral.
-
-    Returns:
-        The answer; None where the gear file says it, or nobody can be asked.
-    """
-    from hdcal.data.reading import leaves_reading_open
-
-    streams = sys.stdin, sys.stderr
-    asks = all(each is not None and each.isatty() for each in streams)
-    asks = asks and not console.json
-    if case is None or not asks or not leaves_reading_open(case.gear):
-        return None
-    words = "Deformation as read, radial or diametral"
-    kinds = click.Choice(READINGS)
-    return click.prompt(words, default="radial", type=kinds, err=True)
+    return console.wrong.attempt(read_case, data, gear, columns=columns, **how)
 
 
 library_option = click.option(
@@ -268,18 +240,6 @@ def is_given(name: str) -> bool:
     """Tell whether a parameter stands on the command line, readable or not."""
     source = click.get_current_context().get_parameter_source(name)
     return source is ParameterSource.COMMANDLINE
-
-
-def needs_folder(name: str, given: bool, out: str | None) -> list[Finding]:
-    """Return a finding where a parameter was given that needs a result folder.
-
-    Args:
-        name: of the parameter.
-        given: whether it was.
-        out: the folder, or None.
-    """
-    words, remedy = "is written into a result folder", "Give `out` too"
-    return [Finding(name, words, remedy)] if given and out is None else []
 
 
 def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:

@@ -35,11 +35,11 @@ def track(console: Console, known, **settings):
     or the first line is a header row such as deformation_mm,force_N, and the others are
     CSV. Each reading is answered at once by a line on standard output.
     """
-    from hdcal.cli.sources import load_usable
+    from hdcal.inference.model_average import load_models
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
-    tracker, bad = Tracker(load_usable(known), **settings), 0
+    tracker, bad = Tracker(load_models(known), **settings), 0
     (mean, half), rate = tracker.stiffness, settings["alarm_rows"]
     words = (
         f"starts at {mean:.4g} ± {half:.2g} {tracker.units.stiffness_unit} (95 %) on a "

@@ -8,6 +8,7 @@ from hdcal.cli import options
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH, WINDOW, unit_findings
+from hdcal.errors import Finding
 
 
 @command(
@@ -70,7 +71,9 @@ def margin(console: Console, run, out, force, certificate, **asked):
     with console.wrong as wrong:
         models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
-        wrong += options.needs_folder("certificate", certificate, out)
+        if certificate and out is None:
+            words = "is written into a result folder"
+            wrong.append(Finding("certificate", words, "Give `out` too"))
         if models is not None:
             units = model_pairs(models)[0][1].case.units
             names = "deformation", "limit_force", "given_force"
