@@ -98,6 +98,7 @@ def test_tested_means_inside_the_data(rubbing):
     found = predict(rubbing, [0.01, 0.3, 0.6], [20.0, 90.0])
     assert list(found.tested) == [False, True, False, False, False, False]
     assert found.untested == 5
+    assert found.beyond_tested == pytest.approx(0.06 / 0.52)
     loading_only = make_records(np.linspace(0.0, 0.5, 9))
     for sense, inside in ((1.0, True), (-1.0, False)):
         found = is_tested(loading_only, deformation=0.3, temperature=20.0, sense=sense)

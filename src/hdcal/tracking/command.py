@@ -60,8 +60,6 @@ def track(console: Console, known, **settings):
         f"{due:.2g} false ones are due without a change"
     )
     if tracker.alarms and not settings["reopen"]:
-        words = "after an alarm the answers are still those of the gear before the "
-        console.words(
-            words + "change, which raises more alarms; --reopen 0.1 learns it"
-        )
+        words = "without --reopen the answers remain those of the gear before a change"
+        console.words(f"{words}, which raises more alarms; --reopen 0.1 learns it")
     return 2 if bad else 0
