@@ -15,17 +15,14 @@ from hdcal import InputError, NotUsable, Prior, calibrate_dynamic, predict, resp
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.model_average import load_models
-from hdcal.motion import mode_search
 from hdcal.motion.dynamic_calibration import whiteness_check
 from hdcal.motion.dynamic_problem import (
-    FRICTION,
     DynamicPosterior,
     build_dynamic,
     dynamic_site_priors,
 )
 from hdcal.motion.dynamic_result import DynamicCalibration, dynamic_calibration_of
-from hdcal.motion.mode_search import friction_peak, highest_peak
-from hdcal.physics.effects.loops import CoulombFriction
+from hdcal.motion.mode_search import highest_peak
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 # One shape and one length for all: the sampler is compiled once.
@@ -187,35 +184,6 @@ def test_dry_friction_is_flagged_by_the_residuals(ratio, friction, flagged):
     assert whiteness(problem, highest_peak(problem)[0]) == expected
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 104))
-def test_the_mode_with_friction_is_as_high_as_that_near_the_truth(seed: int):
-    case = frictional_case(seed, 0.01, 1.0)
-    linear, effects = linear_problem(case), (CoulombFriction,)
-    priors = dynamic_site_priors(case, "ring", effects)
-    problem = build_dynamic(case, priors, "ring", effects)
-    mode = friction_peak(linear, highest_peak(linear)[0], problem)
-    assert whiteness(problem, mode) == "passed"
-    gear = motion(TRUTH, case)
-    truth = TRUTH | {FRICTION: 1.0, "damping_ratio": 0.01, "initial_velocity": 0.0}
-    truth |= {"initial_deformation": 40.0 / gear.stiffness}
-    near = laplace.fit(problem, mode_search._as_sites(problem, truth))
-    level, best = (float(laplace.potential(problem, m.centre)) for m in (mode, near))
-    assert level < best + 1.0
-
-
-@pytest.mark.slow
-def test_the_friction_is_sampled_and_acts_in_a_response():
-    case = frictional_case(0, 0.01, 1.0, rows=96)
-    few = {"chains": 2, "warmup": 300, "draws": 300}
-    found = calibrate_dynamic(case, effects=["coulomb_friction"], **few)
-    low, high = np.quantile(found.draws[FRICTION], [0.001, 0.999])
-    assert low <= 1.0 <= high and high - low < 0.5
-    passed = replace(found, checks=(Check("by hand", "passed", "by hand"),))
-    asked = {"amplitude": 40.0, "duration": 0.02, "points": 51, "draws": 20}
-    assert respond(passed, "step", **asked).effects == ("coulomb_friction",)
-
-
 @pytest.mark.parametrize(
     ("columns", "labels", "words"),
     [
@@ -239,5 +207,3 @@ def test_a_case_that_does_not_suit_the_model_is_refused():
     assert len(caught.value.findings) == 2
     with pytest.raises(InputError, match="no density"):
         calibrate_dynamic(replace(case, gear=replace(case.gear, density=None)))
-    with pytest.raises(InputError, match="does not hold 'hysteresis'"):
-        calibrate_dynamic(case, effects=["hysteresis", "coulomb_friction"])

@@ -35,7 +35,7 @@ def test_a_calibration_is_a_whole_folder_also_where_it_failed(here: Hdcal):
     summary = json.loads(done.stdout)
     assert summary == json.loads(Path("result/summary.json").read_text("utf-8"))
     obeys(summary, DynamicCalibration)
-    assert summary["schema"] == "hdcal.dynamic-calibration/2"
+    assert summary["schema"] == "hdcal.dynamic-calibration/3"
     names = {"motion.csv", "motion.png", "motion.svg", "posterior.nc", "report.html"}
     names |= {"summary.json", "hdcal-result.json"}
     assert {file.name for file in Path("result").iterdir()} == names
@@ -87,6 +87,6 @@ def test_options_of_other_models_are_refused(here: Hdcal, case: Path):
     given = ["--dynamic", "--effect", "relaxation", "--with-gap", "--constant-noise"]
     done = here("calibrate", case, *given)
     assert done.returncode == 2
-    assert done.stderr.count("does not go with --dynamic") == 2
+    assert done.stderr.count("does not go with --dynamic") == 3
     # A ramp without a clock is no motion.
     assert here("calibrate", case, "--dynamic").returncode == 2

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from posteriors import written_posterior
 from rigs import make_case, make_gear, make_records
+from scipy.integrate import solve_ivp
 
 from hdcal import EFFECTS
 from hdcal.data.priors import dynamic_priors
 from hdcal.inference.problem import unit_stiffness
-from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 TRUTH = {
@@ -57,18 +57,28 @@ def moving_case(seed: int, gear=None, truth=TRUTH, rows: int = 200):
     return make_case(make_records(read, force, **columns), case.gear)
 
 
-def frictional_case(seed, ratio, friction, gear=None, rows: int = 200):
+def frictional_case(seed, ratio, friction):
     """Return a case of a released gear with a damping ratio and dry friction [N]."""
     truth = TRUTH | {"damping_ratio": ratio}
-    case = moving_case(seed, gear, truth, rows)
-    time, force = release(rows)
-    linear = motion(truth, case)
-    start = np.array([force[0] / linear.stiffness, 0.0])
-    smooth = np.asarray(linear_response(linear, time, force, start))[:, 0]
-    rubbed = frictional_response(linear, friction, time, force, start)
-    read = case.records.deformation - smooth + np.asarray(rubbed)[:, 0]
-    known = {"known": {"time"}, "time": time}
-    return make_case(make_records(read, force, **known), case.gear)
+    case = moving_case(seed, None, truth)
+    (time, force), linear = release(), motion(truth, case)
+
+    def moved(rubbing: float) -> np.ndarray:
+        """Integrate, with the sign of friction changing over 10 µm/s."""
+
+        def rates(at, state):
+            drag = linear.damping * state[1] + rubbing * np.tanh(state[1] / 0.01)
+            push = np.interp(at, time, force) - drag - linear.stiffness * state[0]
+            return [state[1], push / linear.mass]
+
+        start = [force[0] / linear.stiffness, 0.0]
+        exact = {"method": "Radau", "rtol": 1e-7, "atol": 1e-9, "max_step": 1e-3}
+        # Held, the gear has no error of integration.
+        with np.errstate(divide="ignore"):
+            return solve_ivp(rates, time[[0, -1]], start, t_eval=time, **exact).y[0]
+
+    read = case.records.deformation + (moved(friction) - moved(0.0))
+    return make_case(make_records(read, force, known={"time"}, time=time), case.gear)
 
 
 GEAR = """\
