@@ -8,11 +8,11 @@ from designs import bent, calibrated, known
 from mirrored import mirrored
 from posteriors import batch, single, with_leftover
 
-from hdcal.design.gear_forces import stiffness_ratio
 from hdcal.design.gears import draw_gears
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.prediction.simulate import gear_leftover
+from hdcal.prediction.sizes import stiffness_ratio
 
 AT, WARM = np.array([0.1, 0.4]), np.full(2, 20.0)
 
@@ -26,7 +26,7 @@ def test_the_rig_is_no_part_of_it():
         deformation_offset=0.1,
     )
     stiffness = loose.values["stiffness"]
-    bend = gear_leftover(loose.model.model, AT, seed=0).T
+    bend = gear_leftover(loose.model, AT, seed=0).T
     forces = np.outer(AT, stiffness) + bend
     np.testing.assert_allclose(loose.forces(AT, WARM), forces, 1e-9)
     diametral = replace(loose.gear, reading="diametral", nominal_deformation=0.8)
