@@ -108,12 +108,13 @@ def run(code: str, **environment) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 def test_no_import_changes_state_or_makes_an_array():
     # Without a platform any array is an error.
     run(IMPORTS, JAX_PLATFORMS="none_such")
 
 
-@pytest.mark.parametrize("first", slice_of(FIRST_ARRAYS, ["case"]))
+@pytest.mark.parametrize("first", slice_of(FIRST_ARRAYS, ["compiled force"]))
 def test_first_arrays_are_in_double_precision(first: str):
     gear = hdcal.Geometry(0.68, 40.0, 70.0, 70.0, 0.3)
     check = "\nassert found.dtype == 'float64', found.dtype"

@@ -109,7 +109,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", slice_of(KINDS, ["leftover"]))
 def test_intervals_and_the_rate_of_alarms_hold(kind):
     make, places = KINDS[kind]
-    check(streams(make(), 30, 400, places), 400)
+    check(streams(make(), 20, 300, places), 300)
 
 
 @pytest.mark.thorough
@@ -129,8 +129,8 @@ def calibrated_noise(rho: float):
 )
 def test_the_rate_holds_with_correlated_readings(noise):
     rho, calibrated = noise
-    found = list(streams(calibrated_noise(calibrated), 10, 1500, rho=rho))
-    check(found, 1500)
+    found = list(streams(calibrated_noise(calibrated), 10, 1000, rho=rho))
+    check(found, 1000)
     last = [stream.answers[-1]["correlation"] for _, stream in found]
     assert np.mean(last) == pytest.approx(rho, abs=0.08)
 

@@ -124,6 +124,7 @@ def test_a_torsional_spring_has_keys_and_units_of_its_own(monkeypatch):
         json_reader(TORQUE)(GOOD)
 
 
+@pytest.mark.thorough
 def test_an_answer_comes_before_the_next_line_and_ctrl_c_ends(run):
     with subprocess.Popen(
         [*MAIN, "track", run],
