@@ -49,6 +49,19 @@ def test_members_without_scatter_are_one_force():
     assert same.above(6.9)[0, 0] == 1.0 and same.above(7.1)[0, 0] == 0.0
 
 
+def test_one_member_of_each_draw_has_the_law_of_the_members():
+    many = Members(
+        np.ones(40_000), *(np.repeat(v[1:2], 40_000, axis=0) for v in (SHARE, MEAN, SD))
+    )
+    even = (np.arange(40_000) + 0.5) / 40_000
+    rng = np.random.default_rng(2)
+    levels, scores = rng.permutation(even), stats.norm.ppf(rng.permutation(even))
+    found = many.sample(levels, scores)[:, 0]
+    for level in (0.05, 0.3, 0.8, 0.99):
+        expected = members().quantile(level)[1, 0]
+        assert np.quantile(found, level) == pytest.approx(expected, abs=0.02)
+
+
 def test_one_member_over_all_draws_is_the_weighted_mixture():
     found = one_member(members(), 0.4)
     assert found.mean.shape == (1, 1, 6)
