@@ -1,4 +1,4 @@
-"""Nominal stiffness and peak stress of the flexspline under two opposed radial loads.
+"""Nominal stiffness of the flexspline under two opposed radial loads.
 
 Each theory maps a geometry and Young's modulus to force per *radial*
 displacement of the loaded point [N/mm]; all of them are linear in the modulus.
@@ -122,26 +122,3 @@ THEORIES: dict[str, Stiffness] = {
     "article": article,
     "spring": spring,
 }
-
-
-def peak_stress(geometry: Geometry, modulus: Scalar, deformation: Scalar) -> Scalar:
-    """Return the largest hoop bending stress, under the load: σ = E δ ω / (4 S R²).
-
-    The ring takes the shape w = Σ ω cos nφ / (S (n²−1)²), n = 2, 4, …, whose gain of
-    curvature under the load is −(w″ + w)/R² = ω / (2 S R²).
-
-    The shape is imposed, so that the stress follows from ω and not from the force:
-    what stiffens a real gear by K (teeth, closed end) changes the force and not the
-    curvature of its wall. The wall is taken as smooth and free to contract along its
-    axis; held, the stress is larger by 1/(1 − ν²). Notches at teeth are not in it.
-
-    Args:
-        geometry: sizes [mm].
-        modulus: Young's modulus E [MPa].
-        deformation: radial displacement ω [mm].
-
-    Returns:
-        Stress of the outer surface [MPa].
-    """
-    bend = 0.5 * deformation / RING_SERIES / geometry.radius**2
-    return 0.5 * modulus * geometry.wall_thickness * bend
