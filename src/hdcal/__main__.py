@@ -31,7 +31,7 @@ from hdcal.shared_causes.command import causes
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-# 128 + SIGPIPE, as shells say it of a tool whose reader went away.
+# 128 + SIGPIPE, as shells report a tool whose reader is gone.
 NOBODY_READS = 141
 
 
@@ -61,7 +61,7 @@ _EPILOG = (
     help="Show the version and stop.",
 )
 def hdcal() -> None:
-    """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
+    """Calibrate the force model of a harmonic-drive flexspline and diagnose its gaps.
 
     DATA and CASE are a file of measurements (CSV, or .xlsx) with a gear file (--gear),
     or a folder holding data.csv and gear.toml.
@@ -141,7 +141,7 @@ def _run(arguments: list[str], console: Console) -> int:
         console.failure("error", str(error))
         return NOT_TO_BE_USED
     except SystemExit:
-        # So click ends when nobody reads its help.
+        # Click ends so when the reader of its help is gone.
         console.unread = True
         return DONE
     except (KeyboardInterrupt, click.Abort) as error:

@@ -25,7 +25,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?0,\d+\s*")
 
 
 class Parsed(click.ParamType):
-    """An option's text, read by hdcal; what cannot be read is said with all else.
+    """An option's text, read by hdcal; errors are reported together.
 
     Args:
         name: shown in the help.
@@ -282,7 +282,7 @@ def read_list(texts: Sequence[str], option: str) -> list[str]:
 ENDS = Parsed("LO:HI", read_ends)
 DEFORMATIONS = Parsed("START:STOP:COUNT", read_deformations)
 NUMBERS = Parsed("LIST", read_grid)
-# Temperatures whose worst counts: a window is spread over eleven.
+# Temperatures of which the worst counts: a window is spread over eleven.
 WINDOW = Parsed("FROM:TO", partial(read_window, count=11))
 FORCE = Parsed("N", partial(read_quantity, unit="N"))
 LENGTH = Parsed("MM", partial(read_quantity, unit="mm"))

@@ -237,7 +237,7 @@ sampling_options = combined(
 
 
 def is_given(name: str) -> bool:
-    """Tell whether a parameter stands on the command line, readable or not."""
+    """Return whether a parameter was given on the command line, readable or not."""
     source = click.get_current_context().get_parameter_source(name)
     return source is ParameterSource.COMMANDLINE
 

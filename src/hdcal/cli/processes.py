@@ -1,4 +1,4 @@
-"""Work shared by processes of this machine."""
+"""Tasks in several processes of this machine."""
 
 import multiprocessing
 import os
@@ -49,7 +49,7 @@ def run_all(
         pool.shutdown()
         return [future.result() for future in futures]
     except BaseException:
-        # Nobody waits for tasks that have begun.
+        # Do not wait for tasks that have begun.
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in {*multiprocessing.active_children()} - others:
             worker.terminate()
@@ -57,7 +57,7 @@ def run_all(
 
 
 def _begin() -> None:
-    """Prepare a process that works for another, which alone hears the keyboard."""
+    """Prepare a worker process; its parent alone handles the keyboard."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Console(json=False).prepare()
@@ -65,7 +65,7 @@ def _begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process once the one that it works for is gone, however it went."""
+    """End this process once its parent is gone."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])
