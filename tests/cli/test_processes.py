@@ -19,7 +19,7 @@ WORK = (
     "if __name__ == '__main__': run_all(time.sleep, [(100,), (100,)], 2)"
 )
 FAILING = """
-import multiprocessing
+import multiprocessing, time
 from hdcal.cli.processes import run_all
 
 def fail(text):
@@ -29,6 +29,7 @@ if __name__ == "__main__":
     try:
         run_all(fail, [("a",), ("b",)], 2)
     except ValueError:
+        time.sleep(2)
         print(len(multiprocessing.active_children()))
 """
 SLOW = """

@@ -9,7 +9,6 @@ from click.core import ParameterSource
 
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
-    FORCE,
     read_all,
     read_columns,
     read_list,
@@ -196,24 +195,6 @@ tolerance_option = repeated_option(
     metavar="SIZE_mm=±",
     read=partial(read_named, read=partial(read_quantity, unit="mm")),
     help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
-)
-decision_options = combined(
-    click.option(
-        "--limit-force",
-        type=FORCE,
-        help="Capacity of the actuator [N]: its size, in compression and in tension.",
-    ),
-    click.option(
-        "--rule",
-        type=click.Choice(["guarded", "simple"]),
-        help="Decision about it, by the expanded uncertainty or not "
-        "[default: guarded].",
-    ),
-)
-certificate_option = click.option(
-    "--certificate",
-    is_flag=True,
-    help="Also write a certificate to sign, one A4 page.",
 )
 seed_option = click.option(
     "--seed",

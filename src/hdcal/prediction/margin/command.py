@@ -19,7 +19,16 @@ from hdcal.errors import Finding
 @click.option(
     "--deformation", type=LENGTH, required=True, help="Deformation as read [mm]."
 )
-@options.decision_options
+@click.option(
+    "--limit-force",
+    type=FORCE,
+    help="Capacity of the actuator [N]: its size, in compression and in tension.",
+)
+@click.option(
+    "--rule",
+    type=click.Choice(["guarded", "simple"]),
+    help="Decision about it, by the expanded uncertainty or not [default: guarded].",
+)
 @click.option(
     "--given-force",
     type=FORCE,
@@ -55,7 +64,11 @@ from hdcal.errors import Finding
 @options.seed_option
 @options.folder_options("Write a result folder with a report.")
 @options.json_option
-@options.certificate_option
+@click.option(
+    "--certificate",
+    is_flag=True,
+    help="Also write a certificate to sign, one A4 page.",
+)
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force needed at a deformation, from RUN.
