@@ -109,7 +109,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", slice_of(KINDS, ["leftover"]))
 def test_intervals_and_the_rate_of_alarms_hold(kind):
     make, places = KINDS[kind]
-    check(streams(make(), 20, 300, places), 300)
+    check(streams(make(), 30, 400, places), 400)
 
 
 @pytest.mark.thorough
