@@ -14,9 +14,8 @@ FOLDER = Path(__file__).parents[1] / "datasets" / "thermal-demo"
 class WarmFriction(
     hdcal.Effect,
     stage="force",
-    groups=("loop",),
+    family="loop",
     needs=("temperature", "unloading"),
-    symmetry="none",
 ):
     """F → F + h s (T − T_ref): friction that grows with temperature.
 

@@ -8,9 +8,7 @@ import numpy as np
 import hdcal
 
 
-class QuadraticGauge(
-    hdcal.Effect, stage="deformation", groups=("curve up",), symmetry="even"
-):
+class QuadraticGauge(hdcal.Effect, stage="deformation", family="curve up"):
     """A displacement gauge that is not quite linear: ω → ω + e ω²."""
 
     error: float = hdcal.parameter(

@@ -1,4 +1,4 @@
-"""Executables: shared by all processes of a test run, and forgotten in time."""
+"""Compiled programs: shared by all processes of a test run, and dropped in time."""
 
 import gc
 import os
@@ -9,18 +9,12 @@ import zlib
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 pytest_plugins = ["commands", "clusters"]
 
 _OWN = pytest.StashKey[str]()
-# Code that no trace holds: it reads, decides, writes or keeps the traces.
-_NEVER_TRACED = (
-    *("hdcal.cli", "hdcal.data", "hdcal.design", "hdcal.diagnosis", "hdcal.exported"),
-    "hdcal.report",
-)
 _COMPILED_PLAINLY = (
     "--xla_backend_optimization_level=1 --xla_cpu_parallel_codegen_split_count=1 "
     "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
@@ -90,21 +84,8 @@ def few_executables() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def own_traces() -> Iterator[None]:
-    """Keep no trace of code that a test has changed, and load none in its place."""
-    change = pytest.MonkeyPatch.setattr
-
-    def change_untraced(
-        patch: pytest.MonkeyPatch, target: object, *given: Any, **named: Any
-    ) -> None:
-        change(patch, target, *given, **named)
-        if isinstance(target, str):
-            changed = target
-        else:
-            changed = getattr(target, "__module__", getattr(target, "__name__", ""))
-        if changed.startswith("hdcal.") and not changed.startswith(_NEVER_TRACED):
-            change(patch, "hdcal.exported._needs_plain_jit", lambda: True)
-
-    with pytest.MonkeyPatch.context() as hook:
-        hook.setattr(pytest.MonkeyPatch, "setattr", change_untraced)
-        yield
+def fresh_traces(request: pytest.FixtureRequest) -> None:
+    """Cache and load no programs in a test that replaces code."""
+    if "monkeypatch" in request.fixturenames and "hdcal.exported" in sys.modules:
+        patch = request.getfixturevalue("monkeypatch")
+        patch.setattr("hdcal.exported._needs_plain_jit", lambda: True)

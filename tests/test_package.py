@@ -1,4 +1,4 @@
-"""What is handed over works away from this checkout and names no machine."""
+"""The wheel works away from this checkout, and no file names a machine."""
 
 import os
 import re
@@ -39,11 +39,9 @@ def run(*command: str | Path, **options) -> str:
 
 def shipped(folder: str) -> set[str]:
     """Return the files below a top-level folder, as paths from the root."""
-    return {
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / folder).rglob("*")
-        if path.is_file()
-    }
+    files = (path for path in (ROOT / folder).rglob("*") if path.is_file())
+    names = {path.relative_to(ROOT).as_posix() for path in files}
+    return {name for name in names if "/__pycache__/" not in name}
 
 
 @pytest.fixture(scope="module")
@@ -55,48 +53,29 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-@pytest.fixture(scope="module")
-def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install the wheel, without its dependencies, into a folder of its own."""
-    target = tmp_path_factory.mktemp("installed")
-    options = ["--quiet", "--no-deps", "--no-index", "--target", target]
-    run(sys.executable, "-m", "pip", "install", *options, wheel)
-    return target
-
-
-@pytest.mark.parametrize("folder", ["priors", "datasets"])
-def test_the_wheel_holds_the_data(folder: str, wheel: Path):
-    expected = {f"hdcal/_data/{name}" for name in shipped(folder)}
-    assert expected
-    assert expected <= set(zipfile.ZipFile(wheel).namelist())
-
-
-def test_the_wheel_holds_every_file_of_the_package(wheel: Path):
-    expected = {
-        n.removeprefix("src/") for n in shipped("src") if "/__pycache__/" not in n
-    }
-    assert expected <= set(zipfile.ZipFile(wheel).namelist())
-
-
-def test_the_wheel_holds_nothing_but_the_package(wheel: Path):
-    tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+def test_the_wheel_holds_package_and_data_and_nothing_else(wheel: Path):
+    names = {*zipfile.ZipFile(wheel).namelist()}
+    data = {f"hdcal/_data/{n}" for f in ("priors", "datasets") for n in shipped(f)}
+    code = {name.removeprefix("src/") for name in shipped("src")}
+    assert data and code and data | code <= names
+    tops = {name.split("/")[0] for name in names}
     assert tops == {"hdcal", f"{'-'.join(wheel.name.split('-')[:2])}.dist-info"}
 
 
 @pytest.mark.parametrize("form", ["installed", "wheel"])
-def test_data_are_found_away_from_the_checkout(
-    form: str, request: pytest.FixtureRequest, tmp_path: Path
-):
+def test_data_are_found_away_from_the_checkout(form: str, wheel: Path, tmp_path: Path):
     # A wheel on the path is imported as a zip: no file of it exists on disk.
-    place = request.getfixturevalue(form)
+    place = wheel
+    if form == "installed":
+        place = tmp_path / "installed"
+        options = ["--quiet", "--no-deps", "--no-index", "--target", place]
+        run(sys.executable, "-m", "pip", "install", *options, wheel)
     environment = {**os.environ, "PYTHONPATH": str(place)}
-    printed = run(
-        sys.executable, "-c", LIST_PRIORS, cwd=tmp_path, env=environment
-    ).splitlines()
-    assert printed[0].startswith(str(place))
-    names = {Path(name).name for name in shipped("priors")}
-    assert set(printed[1].split()) == names
-    assert printed[2].split() == list(pages())
+    listed = run(sys.executable, "-c", LIST_PRIORS, cwd=tmp_path, env=environment)
+    file, priors, topics = listed.splitlines()
+    assert file.startswith(str(place))
+    assert {*priors.split()} == {Path(name).name for name in shipped("priors")}
+    assert topics.split() == list(pages())
 
 
 def test_no_file_names_a_machine_or_a_package_index():
@@ -112,10 +91,11 @@ def test_no_file_names_a_machine_or_a_package_index():
     for name in filter(None, listed.stdout.decode().split("\0")):
         path = ROOT / name
         content = path.read_bytes() if path.is_file() else b""
-        if b"\0" in content:
-            continue
-        text = content.decode("utf-8", "replace")
-        found += [f"{name}: {what}" for what, p in patterns.items() if p.search(text)]
+        if b"\0" not in content:
+            text = content.decode("utf-8", "replace")
+            found += [
+                f"{name}: {what}" for what, p in patterns.items() if p.search(text)
+            ]
     assert not found, "\n".join(found)
 
 
@@ -123,5 +103,4 @@ def test_every_pin_has_a_hash():
     for name in ("requirements.lock", "requirements-bench.lock"):
         text = (ROOT / name).read_text("utf-8").replace("\\\n", "")
         pins = [line for line in text.splitlines() if re.match(r"[a-z]", line)]
-        assert pins
-        assert all("--hash=sha256:" in pin for pin in pins), name
+        assert pins and all("--hash=sha256:" in pin for pin in pins), name

@@ -1,7 +1,6 @@
-"""Every number that is given has one range, and is refused just outside it."""
+"""Every number that is given has a range, and is refused just outside it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -14,12 +13,11 @@ from moving import still_posterior
 import hdcal
 from hdcal.__main__ import hdcal as program
 from hdcal.cli.option_types import Parsed
-from hdcal.data.case import Case
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
 from hdcal.data.measurements.force_table import read_columns
 from hdcal.data.measurements.measurements import read_measurements
-from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
+from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
 from hdcal.data.tables.headers import DIMENSIONS
 from hdcal.data.units import unit_names
 from hdcal.errors import InputError
@@ -36,53 +34,63 @@ yield_strength = {{ family = "fixed", value = {yield_strength!r} }}
 STEEL = {"E0": 2e5, "alpha": 3e-4, "poisson": 0.3, "density": 7.8e-9}
 STEEL |= {"cte": 1e-5, "yield_strength": 800.0}
 UNITS = {"E0": "MPa", "alpha": "1/K", "mass": "N*s^2/mm"}
+KEYS = (
+    *("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm"),
+    *("gear.load_height_mm", "gear.nominal_deformation_mm", "rig.filter_Hz"),
+    *("measurement.reference_temperature_C", "measurement.force_resolution_N"),
+    *("rig.load_cell_capacity_N", "rig.gauge_range_mm", "rig.displacement_pitch_mm"),
+    *("measurement.force_calibration.k", "measurement.force_calibration.expanded_N"),
+    "measurement.temperature_calibration.expanded_K",
+    "measurement.force_calibration.expanded_percent",
+)
+PRIORS = (
+    *("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma", "mass"),
+    *("run_offset_sd", "specimen_sd", "gap_sd", "gap_length", "damping_ratio"),
+    *("initial_deformation", "initial_velocity", "deformation_sigma"),
+    *("noise_correlation", "seating_slack.clearance"),
+)
 
 
-@pytest.fixture(scope="module")
-def posterior():
-    return still_posterior(K=0.02)
+def quantity_of(key: str) -> str:
+    """Return the quantity of a key such as gear.radius_mm or priors.K."""
+    name = key.rpartition(".")[2]
+    if name not in {*NAMES, *RANGES}:
+        name = name.rpartition("_")[0]
+    return NAMES.get(name, name)
 
 
-def own_header(quantity: str) -> str:
+def header(quantity: str) -> str:
     return f"{quantity}_{unit_names(DIMENSIONS[quantity])[0]}"
 
 
 def column(quantity: str, value, folder: Path) -> None:
     """Read a table with one such cell."""
-    header = own_header(quantity)
-    rest = [own_header(name) for name in ("deformation", "force")]
-    others = [name for name in rest if name != header]
-    rows = [f"{value!r},{','.join(['0'] * len(others))}\n" for _ in range(6)]
-    (folder / "data.csv").write_text(",".join([header, *others]) + "\n" + "".join(rows))
+    names = [header(quantity), *map(header, ("deformation", "force"))]
+    names = [*dict.fromkeys(names)]
+    rows = [",".join([repr(value), *["0"] * (len(names) - 1)]) for _ in range(6)]
+    file = folder / "data.csv"
+    file.write_text("\n".join([",".join(names), *rows]) + "\n")
     if quantity == "torque":
         with FileFindings("data.csv") as findings:
-            read_columns(
-                folder / "data.csv",
-                None,
-                findings,
-                quantities=("torque",),
-                required=("torque",),
-            )
-    read_measurements(folder / "data.csv")
+            kinds = {"quantities": ("torque",), "required": ("torque",)}
+            read_columns(file, None, findings, **kinds)
+    read_measurements(file)
 
 
 def gear_key(key: str, value, folder: Path) -> None:
     """Read a gear file with one such number."""
-    name = key.rpartition(".")[2]
+    table, _, name = key.rpartition(".")
     kept = [line for line in GEAR.splitlines() if not line.startswith(f"{name} ")]
-    table = "" if key.startswith("gear.") else f"[{key.rpartition('.')[0]}]\n"
-    (folder / "gear.toml").write_text("\n".join([*kept, f"{table}{name} = {value!r}"]))
+    head = "" if table == "gear" else f"[{table}]\n"
+    (folder / "gear.toml").write_text("\n".join([*kept, f"{head}{name} = {value!r}"]))
     read_gear(folder / "gear.toml")
 
 
-def prior(
-    key: str, value, folder: Path, family="fixed", size="value", rest="", gear=""
-) -> None:
+def prior(key: str, value, folder: Path, family="fixed", size="value", rest="") -> None:
     """Read a gear file with one such prior."""
-    name = key.rpartition(".")[2]
-    unit = f', unit = "{UNITS[name]}"' if name in UNITS else ""
+    unit = f', unit = "{UNITS[key]}"' if key in UNITS else ""
     entry = f'{key} = {{ family = "{family}", {size} = {value!r}{rest}{unit} }}'
-    (folder / "gear.toml").write_text(f"{GEAR}{gear}[priors]\n{entry}\n")
+    (folder / "gear.toml").write_text(f"{GEAR}[priors]\n{entry}\n")
     read_gear(folder / "gear.toml")
 
 
@@ -94,52 +102,24 @@ def material(name: str, value, folder: Path) -> None:
 
 
 def read_entries() -> Iterator[tuple[str, str, Callable]]:
-    """Yield the quantity, how a finding names it, and what reads it from a file."""
+    """Yield the quantity, the name of its place, and what reads it from a file."""
     for name in DIMENSIONS:
-        yield name, own_header(name), partial(column, name)
-    sizes = ("wall_thickness", "radius", "length", "load_height", "nominal_deformation")
-    for key in [
-        *(f"gear.{name}_mm" for name in sizes),
-        *("measurement.reference_temperature_C", "measurement.force_resolution_N"),
-        *("rig.load_cell_capacity_N", "rig.gauge_range_mm"),
-        *("rig.displacement_pitch_mm", "rig.filter_Hz"),
-    ]:
-        name = key.rpartition(".")[2].rpartition("_")[0]
-        yield NAMES.get(name, name), key, partial(gear_key, key)
-    stated = {"force": ("percent", "N"), "deformation": ("mm",), "temperature": ("K",)}
-    for gauge, units in stated.items():
-        table = f"measurement.{gauge}_calibration"
-        for name in ("k", *(f"expanded_{unit}" for unit in units)):
-            key = f"{table}.{name}"
-            yield NAMES.get(name, name), key, partial(gear_key, key)
+        yield name, header(name), partial(column, name)
+    for key in KEYS:
+        yield quantity_of(key), key, partial(gear_key, key)
     for name in STEEL:
         yield name, f"{name}.value", partial(material, name)
-    for name in (
-        *("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"),
-        *("run_offset_sd", "specimen_sd", "gap_sd", "gap_length", "mass"),
-        *("damping_ratio", "initial_deformation", "initial_velocity"),
-        *("deformation_sigma", "noise_correlation"),
-    ):
-        place = f"priors.{name}.value"
-        yield NAMES.get(name, name), place, partial(prior, name)
-    spring = partial(prior, "K", gear='theory = "spring"\n')
-    yield "spring_stiffness", "priors.K.value", spring
-    effect = "seating_slack.clearance"
-    yield "effect", f"priors.{effect}.value", partial(prior, effect)
+    for name in PRIORS:
+        quantity = "effect" if "." in name else NAMES.get(name, name)
+        yield quantity, f"priors.{name}.value", partial(prior, name)
     spread = {"family": "lognormal", "size": "log_sd", "rest": ", median = 2.0"}
     yield "log_sd", "priors.K.log_sd", partial(prior, "K", **spread)
-    shape = {"family": "beta", "rest": ", b = 1.0"}
-    yield "beta", f"priors.{effect}.a", partial(prior, effect, size="a", **shape)
+    shape = {"family": "beta", "size": "a", "rest": ", b = 1.0"}
+    name = "seating_slack.clearance"
+    yield "beta", f"priors.{name}.a", partial(prior, name, **shape)
 
 
-def _falling(case: Case) -> Case:
-    """Return a case whose force falls, which nobody diagnoses."""
-    records = case.records
-    return replace(case, records=replace(records, force=-records.force))
-
-
-# Each call is refused for another reason as well, so that nothing is computed where the
-# number is plausible: what counts is only whether the number is named too.
+# Each call is refused for another reason as well, so that nothing is computed.
 ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
     (
         lambda run, **asked: hdcal.margin(run, **{"deformation": 0.4, **asked}),
@@ -167,11 +147,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         {"window": (0.3, 0.4), "tolerances": {"colour_mm": 1.0}},
         ("window", "setting_sd", "rates", "temperatures", "probability"),
     ),
-    (
-        hdcal.wave_generator,
-        {"window": (0.4, 0.3)},
-        ("tolerances",),
-    ),
+    (hdcal.wave_generator, {"window": (0.4, 0.3)}, ("tolerances",)),
     (
         hdcal.study,
         {"vary": {"radius_mm": [38.0]}, "materials": ["stel"]},
@@ -189,57 +165,29 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("chains", "warmup", "draws", "seed"),
     ),
     (
-        lambda run, **asked: hdcal.calibrate_dynamic(run.case, **asked),
-        {},
-        ("chains", "warmup", "draws", "seed"),
-    ),
-    (
         lambda run, **asked: hdcal.Tracker(run, **{"reopen": -1.0, **asked}),
         {},
         ("alarm_rows", "reopen"),
     ),
-    (
-        lambda run, **asked: hdcal.fit(run.case, **asked),
-        {},
-        ("degrees", "at"),
-    ),
-    (
-        lambda run, **asked: hdcal.causes(run.case, **{"seed": -1, **asked}),
-        {},
-        ("jobs",),
-    ),
-    (lambda run, seed: hdcal.diagnose(_falling(run.case), seed=seed), {}, ("seed",)),
+    (lambda run, **asked: hdcal.fit(run.case, **asked), {}, ("degrees", "at")),
+    (lambda run, **a: hdcal.causes(run.case, **{"seed": -1, **a}), {}, ("jobs",)),
 ]
 SEVERAL = {
     "tolerances": lambda v: {"radius_mm": v},
     "temperatures": lambda v: [20.0, v],
-    "temperature": lambda v: v,
     "degrees": lambda v: [v],
     "window": lambda v: (v, 0.4),
     "rates": lambda v: (v, 1.0),
     "vary": lambda v: {"radius_mm": (v, 40.0)},
 }
+READ = [*read_entries()]
+CALLS = [(f, other, name) for f, other, names in ASKED for name in names]
 
 
-def asked_entries() -> Iterator[tuple[str, str, Callable]]:
-    """Yield the quantity, its parameter, and what asks with it."""
-    for function, other, names in ASKED:
-        for name in names:
-            quantity = {"vary": "size"}.get(name, name)
-            if function is hdcal.respond and name == "draws":
-                quantity = "gears"
-
-            def ask(value, run, function=function, other=other, name=name):
-                given = SEVERAL.get(name, lambda v: v)(value)
-                return function(run, **{**other, name: given})
-
-            yield NAMES.get(quantity, quantity), name, ask
-
-
-def named_as_beyond(ask: Callable) -> set[str]:
-    """Return what is refused for lying outside its range."""
+def outside_names(call: Callable) -> set[str]:
+    """Return the places that are refused for lying outside their ranges."""
     try:
-        ask()
+        call()
     except InputError as error:
         wrong = [f for f in error.findings if "does not lie between" in f.problem]
         assert all(f.remedy for f in wrong)
@@ -247,87 +195,66 @@ def named_as_beyond(ask: Callable) -> set[str]:
     return set()
 
 
-def ends(known: Range) -> tuple[list, list]:
-    """Return numbers at the ends of a range, and those just outside."""
-    low, high = known.low, known.high
+def outside(quantity: str) -> list[float]:
+    """Return numbers just outside both ends of a range."""
+    low, high = RANGES[quantity].low, RANGES[quantity].high
     if isinstance(low, int):
-        return [low, high], [low - 1, high + 1]
-    below = low - 1e-6 * (abs(low) or 1.0)
-    above = high + 1e-6 * (abs(high) or 1.0)
-    if known.inner:
-        return [low + 1e-9, high - 1e-9], [low, high, below, above]
-    return [low, high], [below, above]
-
-
-READ, ASK = list(read_entries()), list(asked_entries())
+        return [low - 1, high + 1]
+    return [low - 1e-6 * (abs(low) or 1.0), high + 1e-6 * (abs(high) or 1.0)]
 
 
 @pytest.mark.parametrize("entry", READ, ids=[place for _, place, _ in READ])
-def test_what_a_file_gives_is_refused_just_outside_its_range(entry, tmp_path: Path):
+def test_a_number_of_a_file_is_refused_just_outside_its_range(entry, tmp_path: Path):
     quantity, place, read = entry
-    inside, outside = ends(RANGES[quantity])
-    for value in inside:
-        assert place not in named_as_beyond(partial(read, value, tmp_path)), value
-    for value in outside:
+    for value in outside(quantity):
         # A negative size of a prior is refused for its sign already.
         if value <= 0.0 and place.startswith(("priors.", *STEEL)):
             with pytest.raises(InputError):
                 read(value, tmp_path)
-            continue
-        assert place in named_as_beyond(partial(read, value, tmp_path)), value
+        else:
+            assert place in outside_names(partial(read, value, tmp_path)), value
+    high = RANGES[quantity].high
+    inside = high - 1e-9 if RANGES[quantity].inner else high
+    assert place not in outside_names(partial(read, inside, tmp_path))
 
 
-@pytest.mark.parametrize("entry", ASK, ids=[place for _, place, _ in ASK])
-def test_what_is_asked_is_refused_just_outside_its_range(entry, posterior):
-    quantity, name, ask = entry
-    inside, outside = ends(RANGES[quantity])
-    for value in inside if quantity != "seed" else [1]:
-        assert name not in named_as_beyond(partial(ask, value, posterior)), value
-    for value in outside:
-        assert name in named_as_beyond(partial(ask, value, posterior)), value
+def test_a_parameter_is_refused_just_outside_its_range():
+    posterior = still_posterior(K=0.02)
+    for function, other, name in CALLS:
+        quantity = {"vary": "size"}.get(name, NAMES.get(name, name))
+        if function is hdcal.respond and name == "draws":
+            quantity = "gears"
+        given = SEVERAL.get(name, lambda v: v)
+        for value in outside(quantity):
+            call = partial(function, posterior, **{**other, name: given(value)})
+            assert name in outside_names(call), (name, value)
 
 
-def test_every_range_is_used():
-    used = {quantity for quantity, _, _ in (*READ, *ASK)}
-    assert used | {"share"} == RANGES.keys()
-
-
-def options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:
+def options(command: click.Command) -> Iterator[click.Parameter]:
     """Yield every option of a program that takes numbers."""
     if isinstance(command, click.Group):
         for below in command.commands.values():
             yield from options(below)
         return
+    numbers = (Parsed, click.types.IntParamType, click.types.FloatParamType)
     for option in command.params:
-        kind = option.type
-        number = isinstance(kind, Parsed | click.types.IntParamType)
-        number |= isinstance(kind, click.types.FloatParamType)
-        # A second check would be said before all others, and alone.
-        assert not isinstance(kind, click.IntRange | click.FloatRange)
-        if number:
-            yield f"{command.name} {option.opts[0]}", option
+        # A range of click would be checked before all others, and alone.
+        assert not isinstance(option.type, click.IntRange | click.FloatRange)
+        if isinstance(option.type, numbers):
+            yield option
 
 
-NUMBERS = dict(options(program))
+def test_every_option_that_takes_a_number_has_a_range():
+    found = [*options(program)]
+    assert len(found) > 35
+    assert all(range_of(str(option.name)).why for option in found)
 
 
-@pytest.mark.parametrize("name", NUMBERS)
-def test_every_option_that_takes_a_number_has_a_range(name: str):
-    assert len(NUMBERS) > 35
-    assert range_of(str(NUMBERS[name].name)).why
-
-
-def test_numbers_beyond_any_computer_are_refused():
+def test_what_is_no_number_or_no_table_is_refused():
     for value in (10**400, -(10**5000), float("inf")):
         with pytest.raises(InputError, match="does not lie between"):
             hdcal.calibrate(hdcal.read_case(XB1), seed=value)
-
-
-@pytest.mark.parametrize("given", [[{"force_N": 1.0}], np.ones((5, 2)), 3])
-def test_what_is_no_table_is_told(given):
-    with pytest.raises(InputError, match="Give a path, a DataFrame, or arrays"):
-        hdcal.read_case(given)
-
-
-def test_a_text_is_no_number():
+    for given in ([{"force_N": 1.0}], np.ones((5, 2)), 3):
+        with pytest.raises(InputError, match="Give a path, a DataFrame, or arrays"):
+            hdcal.read_case(given)
     assert "'a' is no number" in str(InputError(implausible("seed", "a")))

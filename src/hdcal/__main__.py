@@ -8,7 +8,6 @@ import signal
 import sys
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 
 import click
 import platformdirs
@@ -19,7 +18,6 @@ from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
 from hdcal.classical.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
-from hdcal.cli.here import what_next
 from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command import design, study
@@ -29,12 +27,11 @@ from hdcal.fleets.command import fleet
 from hdcal.fleets.margin_command import margin
 from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
-from hdcal.report.plain import printable
 from hdcal.shared_causes.command import causes
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-# 128 + SIGPIPE, as shells say it of a tool whose reader went away.
+# 128 + SIGPIPE, as shells report a tool whose reader is gone.
 NOBODY_READS = 141
 
 
@@ -46,30 +43,12 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
         context.exit()
 
 
-# Former commands, and what to use instead.
-REMOVED = {
-    "audit": "'hdcal help audit', the page of the documentation",
-    "blind": "'make blind' in a clone of the project",
-    "completion": "click's own: _HDCAL_COMPLETE=bash_source hdcal",
-}
-
-
-class _Commands(click.Group):
-    """The commands; a former one is answered with what to use instead."""
-
-    def resolve_command(self, ctx: click.Context, args: list[str]):
-        if args[0] in REMOVED:
-            ctx.fail(f"'{args[0]}' is no command any more; use {REMOVED[args[0]]}")
-        return super().resolve_command(ctx, args)
-
-
 _EPILOG = (
     "Exit codes: 0 done, 1 no result that may be used, 2 bad input, 130 interrupted."
 )
 
 
 @click.group(
-    cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=_EPILOG,
 )
@@ -82,7 +61,7 @@ _EPILOG = (
     help="Show the version and stop.",
 )
 def hdcal() -> None:
-    """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
+    """Calibrate the force model of a harmonic-drive flexspline and diagnose its gaps.
 
     DATA and CASE are a file of measurements (CSV, or .xlsx) with a gear file (--gear),
     or a folder holding data.csv and gear.toml.
@@ -143,7 +122,9 @@ def _run(arguments: list[str], console: Console) -> int:
     except click.UsageError as error:
         if not [one for one in arguments if one != "--json"]:
             none = Finding("command line", "names no command", "See hdcal --help")
-            console.findings([none], partial(_show_commands, error))
+            assert error.ctx is not None
+            show = partial(click.echo, hdcal.get_help(error.ctx), err=True)
+            console.findings([none], show)
             return BAD_INPUT
         found = usage_error(error)
         # Click would repeat what was written, however long.
@@ -160,7 +141,7 @@ def _run(arguments: list[str], console: Console) -> int:
         console.failure("error", str(error))
         return NOT_TO_BE_USED
     except SystemExit:
-        # So click ends when nobody reads its help.
+        # Click ends so when the reader of its help is gone.
         console.unread = True
         return DONE
     except (KeyboardInterrupt, click.Abort) as error:
@@ -180,15 +161,6 @@ def _run(arguments: list[str], console: Console) -> int:
         what = " ".join(str(error).split())[:200] or "no further words"
         words = f"internal error ({type(error).__name__}: {what}); please report it, "
         return _failed(error, words + "with what HDCAL_DEBUG=1 prints", console)
-
-
-def _show_commands(error: click.UsageError) -> None:
-    """Show what there is, and what one could do here."""
-    assert error.ctx is not None
-    click.echo(error.ctx.find_root().get_help(), err=True)
-    if steps := list(what_next(Path.cwd())):
-        lines = "\n  ".join(map(printable, steps))
-        click.echo(f"\nIn this folder one could:\n  {lines}", err=True)
 
 
 def _failed(error: Exception, words: str, console: Console) -> int:

@@ -100,7 +100,7 @@ class InputError(HdcalError):
 
 
 class NotWritable(HdcalError):
-    """The disk refused a result while it was written; the text says what is there."""
+    """A result could not be written; the text states what is there."""
 
 
 class NotUsable(HdcalError):
@@ -108,7 +108,7 @@ class NotUsable(HdcalError):
 
 
 class Findings(list[Finding]):
-    """What several steps found wrong, said all at once.
+    """Findings of several steps, reported together.
 
     As a context it raises an `InputError` of everything that was found inside it:
 
@@ -136,5 +136,5 @@ class Findings(list[Finding]):
         elif error is not None:
             return
         if self:
-            # One gear file may be behind many cases; its faults are said once.
+            # One gear file may be behind many cases; its faults are reported once.
             raise InputError(dict.fromkeys(self)) from None

@@ -19,7 +19,6 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-# Packages whose code may be part of a trace; the digest holds their versions.
 # Settings that a trace depends on.
 _TRACE_SETTINGS = (
     "jax_enable_x64",
@@ -27,6 +26,7 @@ _TRACE_SETTINGS = (
     "jax_default_prng_impl",
     "jax_default_matmul_precision",
 )
+# Packages whose code may be part of a trace; the digest holds their versions.
 _TRACED = ("jax", "jaxlib", "numpy", "numpyro", "equinox", "diffrax", "optimistix")
 
 

@@ -9,7 +9,6 @@ from benchmarks.blind import __main__ as program
 from benchmarks.blind.answers import answer_set
 from benchmarks.blind.diagnosers import by_bic, by_hdcal, by_none, by_r2
 from benchmarks.blind.rivals import closable, fit_each
-from benchmarks.blind.temperature import TEMPERATURES, at_each
 from commands import XB1
 from diagnosis_cases import NOISE, rich, simulated
 from rigs import make_case
@@ -20,6 +19,7 @@ from hdcal.errors import InputError
 from hdcal.physics.registry import EFFECTS
 
 
+@pytest.mark.thorough
 def test_a_run_of_four_cases_with_an_interruption(tmp_path, monkeypatch, capsys):
     folder, noted_cases = tmp_path / "set", tmp_path / "noted"
     monkeypatch.setenv("NOTED_CASES", str(noted_cases))
@@ -48,30 +48,16 @@ def test_a_run_of_four_cases_with_an_interruption(tmp_path, monkeypatch, capsys)
         answer_set(folder, "stub", noted)
     assert program.main(opening) == 0
     printed = capsys.readouterr().out
-    assert (
-        f"commitment {commitment}" in printed
-        and f"answers {sha256} by 'stub'" in printed
-    )
+    assert f"commitment {commitment}" in printed and f"answers {sha256}" in printed
     scores = json.loads((folder / "result" / "scores.json").read_text())
     found = {row["what"]: row["found"] for row in scores["rows"]["stub"]}
-    wrong = [
-        each for what, each in found.items() if what.startswith("true effect with")
-    ]
-    assert [each["n"] for each in wrong] == [4]
-    assert printed.strip() == (folder / "result" / "scores.md").read_text().strip()
+    withheld = [name for name in found if name.startswith("true effect with")]
+    assert [found[name]["n"] for name in withheld] == [4]
     assert (folder / "result" / "reliability.png").stat().st_size > 1000
 
 
-def test_answers_of_another_version_are_not_mixed(tmp_path, capsys):
-    folder = tmp_path / "set"
-    program.main(["make", "--cases", "1", "--mix", "null", "--out", str(folder)])
-    header = {"by": "none", "set": "0" * 64, "made_by": "0" * 64}
-    (folder / "answers-none.jsonl").write_text(json.dumps(header) + "\n")
-    assert program.main(["answer", str(folder), "--by", "none"]) == 2
-    assert "of another version" in capsys.readouterr().err
-
-
-def test_a_measurement_is_sealed_under_a_name_that_tells_nothing(tmp_path, capsys):
+@pytest.mark.thorough
+def test_a_sealed_measurement_is_answered_and_opened(tmp_path, capsys):
     folder, data = tmp_path / "mine", ["--from", str(XB1 / "data.csv")]
     make = ["make", *data, "--out", str(folder), "--withhold", "large_deflection"]
     for cause in ("", "large_deflection", "gremlins"):
@@ -80,12 +66,8 @@ def test_a_measurement_is_sealed_under_a_name_that_tells_nothing(tmp_path, capsy
     assert program.main([*make, "--cause", "contact_onset, plastic_yield"]) == 0
     assert [path.name for path in (folder / "cases").iterdir()] == ["case.csv"]
     assert program.main(["answer", str(folder), "--by", "none"]) == 0
-    key = [str(folder), "--key", f"{folder}.key"]
-    assert program.main(["temperature", *key]) == 2
-    assert "is still sealed" in capsys.readouterr().err
-    assert program.main(["open", *key]) == 0
-    printed = capsys.readouterr().out
-    assert "stated contact_onset or plastic_yield; none: acts: nothing" in printed
+    assert program.main(["open", str(folder), "--key", f"{folder}.key"]) == 0
+    assert "stated contact_onset or plastic_yield" in capsys.readouterr().out
 
 
 SHOWN = {
@@ -124,6 +106,7 @@ def test_rivals_on_noise_alone():
         assert sum(each.explanations[name] for name in each.set) >= 0.9
 
 
+@pytest.mark.thorough
 def test_hdcal_answers_as_it_decides():
     size = {"hysteresis": {"force": 4.0, "reach": 0.1}}
     plain, loop = (by_hdcal(simulated(rich(), e, seed=1), EFFECTS) for e in ({}, size))
@@ -134,11 +117,3 @@ def test_hdcal_answers_as_it_decides():
     assert first.explains is not None and loop.gap_N is not None
     for each in (plain, loop):
         assert np.isclose(sum(each.explanations.values()), 1.0)
-
-
-def test_a_higher_temperature_is_less_sure():
-    size = {"hysteresis": {"force": 1.0, "reach": 0.1}}
-    found = at_each(simulated(rich(), size, seed=1), EFFECTS)
-    assert len(found) == len(TEMPERATURES)
-    cold, hot = (each.explanations["hysteresis"] for each in (found[0], found[-1]))
-    assert cold > hot + 0.01

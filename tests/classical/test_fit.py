@@ -120,5 +120,5 @@ def test_the_command_prints_and_writes(here: Hdcal, tmp_path: Path):
     assert here(*arguments).returncode == 2
     done = here("fit", tmp_path / "no.csv", "--degree", "one", "--out", "a/b")
     assert done.returncode == 2 and done.stdout == ""
-    assert all(w in done.stderr for w in ("no.csv", "'one' is no list", "a/b"))
+    assert all(w in done.stderr for w in ("no.csv", "'one' is neither", "a/b"))
     assert here("fit", XB1, "--at", "400").returncode == 2

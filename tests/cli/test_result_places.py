@@ -1,4 +1,4 @@
-"""A command refuses an impossible target before its work, and says what it wrote."""
+"""A command refuses an impossible target before its work and keeps other files."""
 
 import json
 import os
@@ -21,7 +21,7 @@ WRITING = [
 
 
 @pytest.mark.parametrize("asked", WRITING, ids=lambda asked: asked[0])
-def test_a_target_that_cannot_be_written_is_refused_first(
+def test_an_impossible_target_is_refused_first(
     asked: list, here: Hdcal, tmp_path: Path
 ):
     def problem(*more: str) -> str:
@@ -31,34 +31,27 @@ def test_a_target_that_cannot_be_written_is_refused_first(
         return finding["problem"]
 
     with Target("run"):
-        assert problem("--out", "run") == "is being written by another process"
-        assert problem("--out", "run", "--force").startswith("is being written")
+        assert "by another process" in problem("--out", "run")
+        assert "by another process" in problem("--out", "run", "--force")
     assert problem("--out", "none/run") == "its parent folder does not exist"
+    assert problem("--out", "x" * 300)
     Path("mine").mkdir()
     assert "exists already" in problem("--out", "mine")
     assert "is not a result of hdcal" in problem("--out", "mine", "--force")
     assert os.listdir(tmp_path) == ["mine"] and not os.listdir("mine")
 
 
-def test_a_table_of_others_is_kept(here: Hdcal, calibrated, tmp_path: Path):
+def test_a_table_of_another_program_is_kept(here: Hdcal, calibrated, tmp_path: Path):
     asked = ["predict", calibrated[1], "--deformation", "0.1", "--out"]
     (tmp_path / "readings.csv").write_text("deformation_mm,force_N\n0.1,20\n")
-    for more in ([], ["--force"]):
-        assert here(*asked, "readings.csv", *more).returncode == 2
+    assert here(*asked, "readings.csv", "--force").returncode == 2
     assert (tmp_path / "readings.csv").read_text().endswith("0.1,20\n")
-    assert here(*asked, "bands.csv").returncode == 0
-    assert here(*asked, "bands.csv").returncode == 2
-    assert here(*asked, "bands.csv", "--force").returncode == 0
-    assert set(os.listdir(tmp_path)) == {"readings.csv", "bands.csv"}
-
-
-def test_a_result_is_replaced_with_force(here: Hdcal, tmp_path: Path):
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
-        assert here("fit", XB1, "--out", "run", *more).returncode == code
-        assert os.listdir(tmp_path) == ["run"]
+        assert here(*asked, "bands.csv", *more).returncode == code
+    assert {*os.listdir(tmp_path)} == {"readings.csv", "bands.csv"}
 
 
-def test_an_interruption_after_the_end_says_what_is_written(
+def test_an_interruption_after_writing_names_the_result(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     def interrupted(*_) -> None:
@@ -72,7 +65,7 @@ def test_an_interruption_after_the_end_says_what_is_written(
     assert os.listdir(tmp_path) == ["run"]
 
 
-def test_what_appears_meanwhile_is_kept_and_told(
+def test_a_folder_that_appears_during_the_work_is_kept(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     from hdcal.classical import fit
@@ -91,11 +84,10 @@ def test_what_appears_meanwhile_is_kept_and_told(
     assert finding["file"] == "made" and "'made-2'" in finding["problem"]
     assert {path.name for path in tmp_path.iterdir()} == {"made", "made-2"}
     assert [path.name for path in (tmp_path / "made").iterdir()] == ["thesis.txt"]
-    answer = json.loads((tmp_path / "made-2" / "fit.json").read_text("utf-8"))
-    assert answer["schema"] == "hdcal.fit/1"
+    assert (tmp_path / "made-2" / "fit.json").exists()
 
 
-def test_a_disk_that_is_full_keeps_the_older_result(here: Hdcal, tmp_path: Path):
+def test_a_full_disk_keeps_the_older_result(here: Hdcal, tmp_path: Path):
     asked = ["fit", str(XB1), "--out", "run"]
     assert here(*asked).returncode == 0
     before = (tmp_path / "run" / "hdcal-result.json").read_bytes()

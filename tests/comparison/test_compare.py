@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from commands import Hdcal
-from posteriors import plain_draws, ramp_case, single, stiffer, written_posterior
+from posteriors import (
+    plain_draws,
+    ramp_case,
+    single,
+    stiffer,
+    with_leftover,
+    written_posterior,
+)
 from rigs import make_gear
 from schema_checks import obeys
 from scipy.stats import norm
@@ -47,6 +54,16 @@ def test_models_count_as_they_are_probable_and_resolved_differences_come_first()
     assert share == pytest.approx(0.25, abs=0.02)
     assert found.headline.startswith("C is ") and len(found.notes) == 2
     assert found.to_frame().gear.tolist() == ["A", "B", "C"]
+
+
+def test_other_ranges_and_leftovers_are_noted():
+    plain, other = of(200.0, 1.0, 1), with_leftover(400)
+    records = other.case.records
+    wider = replace(records, deformation=1.5 * records.deformation)
+    other = replace(other, case=replace(other.case, records=wider, data_sha256="1"))
+    assert not hdcal.compare({"A": plain, "B": of(200.0, 1.0, 2)}).ranges_differ
+    found = hdcal.compare({"A": plain, "B": other})
+    assert found.ranges_differ and len(found.notes) == 3
 
 
 def test_results_that_cannot_be_compared_are_refused():

@@ -8,13 +8,11 @@ from designs import bent, calibrated, known
 from mirrored import mirrored
 from posteriors import batch, single, with_leftover
 
-from hdcal.design.gear_forces import stiffness_ratio
 from hdcal.design.gears import draw_gears
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
-from hdcal.inference.model_average import LeftOut, ModelAverage
-from hdcal.prediction.models import models_of
 from hdcal.prediction.simulate import gear_leftover
+from hdcal.prediction.sizes import stiffness_ratio
 
 AT, WARM = np.array([0.1, 0.4]), np.full(2, 20.0)
 
@@ -28,7 +26,7 @@ def test_the_rig_is_no_part_of_it():
         deformation_offset=0.1,
     )
     stiffness = loose.values["stiffness"]
-    bend = gear_leftover(loose.model.model, AT, seed=0).T
+    bend = gear_leftover(loose.model, AT, seed=0).T
     forces = np.outer(AT, stiffness) + bend
     np.testing.assert_allclose(loose.forces(AT, WARM), forces, 1e-9)
     diametral = replace(loose.gear, reading="diametral", nominal_deformation=0.8)
@@ -81,22 +79,6 @@ def test_another_material_changes_modulus_and_the_fitted_rest():
     # Bending stress grows with the wall.
     stress = wide.stresses({}, 0.4, [20.0])
     assert stress.max() / stress.min() == pytest.approx(0.78 / 0.58, rel=1e-2)
-
-
-def test_probabilities_left_out_and_effective_draws_of_several_models():
-    """The reference is the variance of a share counted among the draws of both."""
-    left = LeftOut(0.08, "none")
-    average = ModelAverage({"none": (0.7, single()), "x": (0.3, single())}, left)
-    found = draw_gears(average)
-    assert any("8 % of the probability" in note for note in found.model.notes)
-    each = [model.independent_draws for model in models_of(average)]
-    rng = np.random.default_rng(0)
-    counted = [
-        0.7 * rng.binomial(int(each[0]), 0.9) / int(each[0])
-        + 0.3 * rng.binomial(int(each[1]), 0.9) / int(each[1])
-        for _ in range(20_000)
-    ]
-    assert np.var(counted) == pytest.approx(0.09 / found.independent, rel=0.05)
 
 
 def test_unsuitable_sources_are_refused():

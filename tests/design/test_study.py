@@ -5,8 +5,8 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from designs import bent, known
-from posteriors import single, with_leftover
+from designs import bent
+from posteriors import with_leftover
 from rigs import make_gear
 from scipy.stats import lognorm
 
@@ -27,16 +27,7 @@ WALLS = {"wall_thickness_mm": [0.7, 0.6]}
 SHARES = [0.5, 0.025, 0.975]
 
 
-def test_every_combination_in_order():
-    found = study(GEAR, {"wall_thickness_mm": [0.6, 0.7], "radius_mm": [35, 40, 45]})
-    assert found.designs["wall_thickness_mm"].tolist() == [0.6] * 3 + [0.7] * 3
-    assert found.designs["radius_mm"].tolist() == [35, 40, 45] * 2
-    assert set(found.designs["deformation_mm"]) == {0.4}
-    assert set(found.designs["temperature_C"]) == {20.0}
-    assert found.varied == ("wall_thickness_mm", "radius_mm")
-
-
-def test_bands_are_those_of_the_prior():
+def test_bands_of_every_combination_are_those_of_the_prior():
     found = study(GEAR, {"wall_thickness_mm": [0.6, 0.68], "temperature_C": [20, 80]})
     prior = lognorm(0.1, scale=2.2)
     for _, row in found.to_frame().iterrows():
@@ -47,14 +38,20 @@ def test_bands_are_those_of_the_prior():
             # 4000 draws: the tails of the prior to about 1 %.
             expected = pytest.approx(unit * prior.ppf(share), rel=0.012)
             assert row[f"force_{name}_N"] == expected
-    assert found.interval_kind == "equal-tailed prior interval"
-    assert found.assumptions[0].startswith("Prior only")
+    assert found.designs["wall_thickness_mm"].tolist() == [0.6, 0.6, 0.68, 0.68]
+    assert found.designs["temperature_C"].tolist() == [20, 80] * 2
+    assert {*found.designs["deformation_mm"]} == {0.4} and not found.far_sizes
+    far = study(GEAR, {"wall_thickness_mm": [0.4, 0.7]}, materials=["steel", "PEEK"])
+    assert far.far_sizes == {"wall_thickness_mm": 0.4} and len(far.to_frame()) == 4
+    (panel,) = far.charts()["study"].panels
+    assert len([mark for mark in panel.marks if isinstance(mark, Line)]) == 2
 
 
 @pytest.mark.parametrize(
-    "gears", [known(200), bent(200), draw_gears(with_leftover(200))]
+    "make", [lambda: bent(200), lambda: draw_gears(with_leftover(200))]
 )
-def test_blocks_of_designs_are_the_obvious_loop(gears, monkeypatch):
+def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
+    gears = make()
     random = np.random.default_rng(0)
     at, warm = random.uniform(0.1, 0.5, 7), random.choice([20.0, 80.0], 7)
     factor = random.uniform(0.5, 2.0, 7)
@@ -74,26 +71,6 @@ def test_the_forces_of_a_gear_that_is_pulled_are_negative():
     ends = other.to_frame()[["force_lo_N", "force_hi_N"]].to_numpy()
     np.testing.assert_allclose(ends, expected, rtol=1e-9)
     assert np.all(other.designs["stress_MPa"] > 0.0)
-
-
-def test_far_sizes_have_a_warning():
-    assert not study(GEAR, {"wall_thickness_mm": [0.6, 0.7]}).warnings
-    far = study(GEAR, {"wall_thickness_mm": [0.4, 0.7]})
-    assert far.far_sizes == {"wall_thickness_mm": 0.4} and len(far.warnings) == 1
-
-
-def test_the_chart_has_a_curve_for_each_combination():
-    found = study(GEAR, WALLS, materials=["steel", "PEEK"])
-    (panel,) = found.charts()["study"].panels
-    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
-    assert len(lines) == 2 and all(line.x.tolist() == [0.6, 0.7] for line in lines)
-    (alone,) = study(GEAR, {}, materials=["steel", "PEEK"]).charts()["study"].panels
-    assert alone.names == ["steel", "PEEK"]
-    many = study(GEAR, WALLS | {"radius_mm": np.linspace(36.0, 44.0, 9)})
-    (panel,) = many.charts()["study"].panels
-    assert len([mark for mark in panel.marks if isinstance(mark, Line)]) == 6
-    long = study(GEAR, {"wall_thickness_mm": np.linspace(0.6, 0.62, 201)})
-    assert long.page().count("<tr>") == 101 and len(long.to_frame()) == 201
 
 
 @pytest.mark.parametrize(
@@ -117,11 +94,3 @@ def test_bad_input_is_refused(vary, changed, words):
     assert words in str(refused.value)
     names = {finding.file for finding in refused.value.findings}
     assert names <= {*signature(study).parameters, "40CrNiMo.toml"}
-
-
-def test_only_deformations_beyond_the_readings_may_bend():
-    gears = draw_gears(single(size=100))
-    for at, words in ((0.01, "free shape"), (0.8, "a bend"), (-0.3, "a bend")):
-        (warning,) = study(gears, {"deformation_mm": [0.3, at]}).warnings[:1]
-        assert warning.startswith("Extrapolated: deformation") and words in warning
-    assert not study(gears, {"deformation_mm": [0.3]}).untested

@@ -134,13 +134,6 @@ def test_a_generator_that_pulls_is_the_mirror_of_one_that_presses():
         assert len(choice.marks) == 3
 
 
-@pytest.mark.parametrize("window", [(0.2, 0.6), (-0.6, -0.2)])
-def test_the_softest_spring_fits_inside_the_gear(window):
-    found = wave_generator(known(), window, temperatures=[-20.0, 80.0])
-    assert found.spring == found.springs[0]
-    assert 0.0 < np.sign(window[0]) * found.spring.interference_mm < 0.25 * 40.0
-
-
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
@@ -163,10 +156,3 @@ def test_bad_input_is_refused(changed, words):
     assert words in str(refused.value)
     names = {finding.file for finding in refused.value.findings}
     assert names <= {*signature(wave_generator).parameters}
-
-
-def test_all_findings_are_reported():
-    wrong = {"temperatures": [-300.0], "tolerances": {"wall": 1.0}, "probability": 2.0}
-    with pytest.raises(InputError) as refused:
-        wave_generator(known(), (0.4, 0.3), **wrong)
-    assert len(refused.value.findings) == 4

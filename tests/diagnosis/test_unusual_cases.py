@@ -20,7 +20,7 @@ from hdcal.physics.registry import EFFECTS
 HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
 
 
-class Step(Effect, stage="force", groups=("curve up",)):
+class Step(Effect, stage="force", family="curve up"):
     """A step of the force at half the range, an effect of a user."""
 
     force: float = parameter("N", "height of the step", typical=2.0, null=0.0)

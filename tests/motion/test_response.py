@@ -13,7 +13,7 @@ from schema_checks import obeys
 from hdcal import InputError, NotUsable, respond
 from hdcal.data.case import Gear
 from hdcal.inference.discrepancy import BASIS_SIZE
-from hdcal.motion import respond as room
+from hdcal.motion import integration
 from hdcal.motion.respond import Response
 from hdcal.physics.linear_response import LinearGear, linear_response
 
@@ -57,7 +57,9 @@ def test_without_them_the_priors_are_the_answer():
     assert np.ptp(found.motion.iloc[-1][["deformation_lo_mm", "deformation_hi_mm"]]) > 0
 
 
-def test_the_band_is_as_wide_as_the_stiffness_is_uncertain():
+def test_the_band_is_as_wide_as_the_stiffness_is_uncertain(monkeypatch):
+    """Also where the draws are integrated in several parts."""
+    monkeypatch.setattr(integration, "_MOST_STATES", 20 * SMALL["points"])
     slow = ([0.0, 0.019, 0.02], [0.0, 40.0, 40.0])
     found = respond(still_posterior(K=0.05), slow, **KNOWN, **SMALL)
     last, stiffness = found.motion.iloc[-1], found.estimates.stiffness_N_per_mm
@@ -118,17 +120,6 @@ def test_the_band_widens_beyond_what_was_tested():
     assert near.tested.all() and not far.tested.all()
     width = far.deformation_hi_mm - far.deformation_lo_mm
     assert width[: int(np.argmin(far.tested)) // 2].max() < 1e-5 < 1e-3 < width.max()
-
-
-@pytest.mark.thorough
-def test_draws_in_small_batches_move_alike(monkeypatch):
-    given = (still_posterior(K=0.05), "step")
-    together = respond(*given, **KNOWN, **BRIEF)
-    monkeypatch.setattr(room, "_MOST_STATES", 20 * BRIEF["points"])
-    monkeypatch.setattr(room, "_POINTS", 40)
-    apart = respond(*given, **KNOWN, **BRIEF)
-    motions = [one.motion.astype(float) for one in (apart, together)]
-    np.testing.assert_allclose(*motions, atol=1e-10)
 
 
 EFFECTS = {

@@ -6,7 +6,7 @@ from commands import XB1
 
 from hdcal.classical.fit import fit
 from hdcal.data.reading import read_case
-from hdcal.physics.theory import RING_SERIES, article, ring
+from hdcal.physics.theory import RING_SERIES, ring
 
 E = 210e3
 # Powers of the deformation, coefficients, residual sd [N], R².
@@ -56,16 +56,3 @@ def test_least_squares_of_table_2(table, powers, coefficients, sd, r2):
     )
     values = [each.value for each in own.coefficients]
     np.testing.assert_allclose(values, found, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("theory", "expected"), [(article, (0.1289, 0.1218)), (ring, (2.588, 2.448))]
-)
-def test_the_influence_coefficient(gear, table, theory, expected):
-    """With the slope of the line with intercept, and of the line through zero."""
-    deformation, force = table
-    slopes = (
-        np.polyfit(deformation, force, 1)[0],
-        deformation @ force / (deformation @ deformation),
-    )
-    assert np.divide(slopes, theory(gear, E)) == pytest.approx(expected, abs=5e-4)

@@ -130,29 +130,6 @@ def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, loading):
     np.testing.assert_allclose(mean(ProgressiveStiffening(GAIN)), sharp, rtol=5e-5)
 
 
-def test_a_diametral_reading_is_twice_the_radial_one(scattered, base, reading):
-    records = scattered(3)
-    diametral = dataclasses.replace(records, deformation=2.0 * records.deformation)
-    wide = dataclasses.replace(base, deformation_offset=2.0 * base.deformation_offset)
-    np.testing.assert_allclose(
-        compiled(wide, EFFECTS, diametral, Reading(0.5, 20.0))[0],
-        compiled(base, EFFECTS, records, reading)[0],
-        rtol=1e-13,
-        atol=1e-12,
-    )
-
-
-def test_the_modulus_falls_with_temperature(scattered, base, reading):
-    records = scattered(4)
-    offset = base.force_offset
-    warm = predict_reading(base, (), records, reading)[0] - offset
-    cold = dataclasses.replace(records, temperature=np.full(24, 20.0))
-    reference = predict_reading(base, (), cold, reading)[0] - offset
-    loss = 1.0 - base.alpha * (records.temperature - 20.0)
-    np.testing.assert_allclose(warm, reference * loss, rtol=1e-12, atol=1e-12)
-    assert np.ptp(loss) > 0.01
-
-
 def test_parameters_may_differ_from_row_to_row(scattered, reading):
     records = scattered(5)
     bases = [random_base(seed) for seed in range(24)]
@@ -165,7 +142,7 @@ def test_parameters_may_differ_from_row_to_row(scattered, reading):
 
 
 @pytest.mark.parametrize("per_read", [1.0, 0.5])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_linear_core_is_exact(scattered, seed, per_read):
     records, base = scattered(seed + 10), random_base(seed + 10)
     reading = Reading(per_read, 31.0)
@@ -176,52 +153,25 @@ def test_the_linear_core_is_exact(scattered, seed, per_read):
     )
 
 
-def test_the_linear_core_of_many_specimens(scattered, reading):
-    bases = [random_base(seed) for seed in range(3)]
-    shared = bases[0]
-    mixed = Base(
-        jnp.stack([base.stiffness for base in bases]),
-        shared.alpha,
-        shared.deformation_offset,
-        jnp.stack([base.force_offset for base in bases]),
-        shared.sigma,
-    )
-    coefficients = linear_coefficients(mixed, reading)
-    assert coefficients.shape == (3, 4)
-    for index in range(3):
-        own = Base(
-            bases[index].stiffness,
-            shared.alpha,
-            shared.deformation_offset,
-            bases[index].force_offset,
-            shared.sigma,
-        )
-        np.testing.assert_allclose(
-            coefficients[index], linear_coefficients(own, reading), rtol=1e-14
-        )
-
-
-def test_double_precision(scattered, base, reading):
-    # One part in 10⁹ of the deformation is lost in single precision.
-    records = scattered(6)
-    mean, noise = compiled(base, EFFECTS, records, reading)
-    assert mean.dtype == noise.sd.dtype == noise.log_weight.dtype == jnp.float64
-    finer = dataclasses.replace(records, deformation=records.deformation * (1 + 1e-9))
-    change = predict_reading(base, (), finer, reading)[0]
-    change -= predict_reading(base, (), records, reading)[0]
-    expected = base.stiffness * records.deformation * 1e-9
-    expected *= 1.0 - base.alpha * (records.temperature - 20.0)
-    np.testing.assert_allclose(change, expected, rtol=1e-4, atol=1e-13)
-
-
-def test_another_file_needs_no_other_compilation(scattered, reading):
-    @jax.jit
-    def mean(base, effects, records, reading):
-        return predict_reading(base, effects, records, reading)[0]
-
-    for seed in (1, 2):
-        mean(random_base(seed), EFFECTS[:3], scattered(seed), Reading(0.5, 20.0 + seed))
-    assert mean._cache_size() == 1
+@pytest.mark.parametrize("theory", sorted(THEORIES))
+def test_the_force_is_the_chain_without_effects(gear, scattered, reading, theory):
+    records = scattered(8)
+    influence, modulus, alpha, zero, offset = 2.4, 205e3, 4e-4, 0.01, -2.0
+    base = Base(influence * THEORIES[theory](gear, modulus), alpha, zero, offset, 1.0)
+    point = {
+        "geometry": gear,
+        "modulus": modulus,
+        "influence": influence,
+        "alpha": alpha,
+        "deformation_offset": zero,
+        "force_offset": offset,
+    }
+    rise = records.temperature - 20.0
+    given = {"deformation": records.deformation, "temperature_rise": rise}
+    found = force(**point, **given, theory=theory)
+    mean = predict_reading(base, (), records, reading)[0]
+    np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)
+    assert found.dtype == jnp.float64
 
 
 @pytest.mark.parametrize("theory", sorted(THEORIES))
@@ -244,25 +194,3 @@ def test_gradients_of_the_force(gear, differences, theory):
     assert exact.shape == (12,)
     slow = differences(value, point)
     np.testing.assert_allclose(exact, slow, rtol=1e-7, atol=1e-8)
-
-
-@pytest.mark.parametrize("theory", sorted(THEORIES))
-def test_the_force_is_the_chain_without_effects(gear, scattered, reading, theory):
-    records = scattered(8)
-    influence, modulus, alpha, zero, offset = 2.4, 205e3, 4e-4, 0.01, -2.0
-    stiffness = influence * THEORIES[theory](gear, modulus)
-    base = Base(stiffness, alpha, zero, offset, 1.0)
-    found = force(
-        gear,
-        modulus,
-        influence,
-        records.deformation,
-        theory=theory,
-        alpha=alpha,
-        temperature_rise=records.temperature - 20.0,
-        deformation_offset=zero,
-        force_offset=offset,
-    )
-    assert found.shape == (24,)
-    mean = predict_reading(base, (), records, reading)[0]
-    np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)

@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from effect_bench import everyone, typical
+from effect_bench import every_effect, typical
 
 from hdcal import EFFECTS
 from hdcal.data.units import to_code
@@ -24,7 +24,7 @@ def rescaling(unit: str, scales: dict[str, float]) -> float:
     return factor
 
 
-@everyone
+@every_effect
 def test_units_do_not_matter(name, scattered, base, reading):
     """The same rig written in other units of length, force, time and temperature.
 

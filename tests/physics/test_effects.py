@@ -1,4 +1,4 @@
-"""Every effect is null at null, differentiable, symmetric as declared, composable."""
+"""Every effect of the library keeps the promises of the interface."""
 
 import dataclasses
 import pickle
@@ -9,195 +9,337 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from effect_bench import (
-    Compiled,
+    BEYOND_RECORDS,
     bare,
     compiled_chain,
     contribution,
     difference,
-    everyone,
+    every_effect,
+    library,
     noisy,
-    null,
     numbers,
-    score,
-    score_and_slope,
     typical,
 )
 from jax.flatten_util import ravel_pytree
-from slices import slice_of
 
 from hdcal import EFFECTS
+from hdcal.data.priors import effect_priors
+from hdcal.data.units import to_code
+from hdcal.inference.likelihood import log_probability
 from hdcal.inference.padding import repeat_last_row
-from hdcal.physics.chain import predict_reading
+from hdcal.physics.chain import Base, predict_reading
+from hdcal.physics.dynamics import acting
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 
-
-@everyone
-@pytest.mark.parametrize("seed", slice_of(range(3), [0]))
-def test_null_changes_nothing(name, seed, scattered, base, reading):
-    found = contribution([null(name)], (), base, scattered(seed), reading)
-    assert np.max(np.abs(found)) <= 1e-12
-
-
-@everyone
-def test_at_its_typical_size_it_does_something(name, loading, base, reading):
-    records = noisy(loading, base, reading, ())
-    found = contribution([typical(name)], (), base, records, reading)
-    assert np.max(np.abs(found)) > 1e-3
-
-
-def rest(loading):
-    """Return the loading with the gear never touched."""
-    zero = np.zeros(len(loading.deformation))
-    return dataclasses.replace(loading, deformation=zero, rate=zero)
+NAMES = [*EFFECTS]
+UNRAVEL = ravel_pytree((library(), Base(1.0, 0.0, 0.0, 0.0, 1.0), jnp.zeros(24)))[1]
+# How the contribution changes from compression to tension; otherwise its sign does.
+UNCHANGED = {
+    *("displacement_nonlinearity", "thermal_expansion", "thermal_zero_drift"),
+    *("amplifier_drift", "run_offset"),
+    *("quantisation", "heteroscedastic_noise", "outliers"),
+}
+OF_THE_MOVEMENT = {
+    *("coulomb_friction", "load_friction", "hysteresis", "viscous_damping"),
+    *("screw_error", "large_deflection"),
+}
 
 
-@everyone
-@pytest.mark.parametrize("size", [null, typical])
-@pytest.mark.parametrize("moved", [True, False])
-def test_gradients_are_finite(name, size, moved, scattered, base, reading):
-    records = noisy(scattered(6) if moved else rest(scattered(6)), base, reading, ())
-    found = score_and_slope((size(name),), bare(base), numbers(records), reading)
-    assert np.isfinite(ravel_pytree(found)[0]).all()
+@every_effect
+def test_the_declaration_is_complete(name, loading):
+    effect, priors = EFFECTS[name], effect_priors()
+    assert effect.name == name and effect.family
+    assert effect.stage in ("deformation", "force", "sensor", "noise")
+    assert effect.needs <= loading.known | BEYOND_RECORDS
+    declared = parameters(effect)
+    assert declared
+    assert list(declared) == [field.name for field in dataclasses.fields(effect)]
+    for field, about in declared.items():
+        assert 0 < len(about.meaning) <= 80
+        assert np.isfinite(about.typical) and about.typical != about.null
+        prior = priors[f"{name}.{field}"]
+        assert to_code(about.unit) == (1.0, prior.unit) and prior.source
 
 
-@everyone
-@pytest.mark.parametrize("seed", slice_of(range(2), [0]))
-def test_gradients_are_right(name, seed, scattered, base, reading, differences):
-    records = scattered(seed)
-    mean = compiled_chain(base, (), records, reading)[0]
-    # Errors of a few sds: larger ones would drown everything else in the score.
-    error = np.random.default_rng(seed).normal(0.0, 1.0, len(mean))
-    records = dataclasses.replace(records, force=mean + error)
-
-    def value(point):
-        effect, base, deformation = point
-        seen = dataclasses.replace(records, deformation=deformation)
-        return score((effect,), base, seen, reading)
-
-    point = (typical(name), base, records.deformation)
-    slopes = score_and_slope((point[0],), base, numbers(records), reading)[1]
-    exact = ravel_pytree((slopes[0][0], slopes[1], slopes[2].deformation))[0]
-    slow = differences(value, point, step=2e-4)
-    # An entry counts against what its parameter can do in all.
-    scale = np.maximum(np.abs(exact), 1e-3 * np.abs(exact).max())
-    assert np.max(np.abs(exact - slow) / scale) < 1e-6
+def test_every_prior_is_of_an_effect():
+    declared = {f"{name}.{f}" for name in EFFECTS for f in parameters(EFFECTS[name])}
+    assert {*effect_priors()} == declared
 
 
-@everyone
-def test_jit_and_vmap(name, scattered, base, reading):
-    records = scattered(3)
-    declared = parameters(EFFECTS[name])
-    several = [
-        typical(name, **{f: p.typical * factor for f, p in declared.items()})
-        for factor in (0.5, 1.0, 1.5)
-    ]
+def test_a_declaration_without_family_or_with_a_text_for_needs_is_refused():
+    for declared in ({}, {"family": "rig", "needs": "time"}):
+        with pytest.raises(TypeError, match="Own"):
 
-    def everything(effect):
-        mean, noise = predict_reading(base, [effect], records, reading)
-        return mean, noise.sd, noise.log_weight
+            class Own(Effect, stage="force", **declared): ...
 
-    each = [everything(effect) for effect in several]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *several)
-    batch = jax.jit(jax.vmap(everything))(stacked)
-    for index, one in enumerate(each):
-        for fast, slow in zip(batch, one, strict=True):
-            np.testing.assert_allclose(fast[index], slow, rtol=1e-10, atol=1e-11)
-
-
-@everyone
-def test_pytree_round_trip(name):
-    effect = typical(name)
-    leaves, structure = jax.tree.flatten(effect)
-    assert leaves == [about.typical for about in parameters(effect).values()]
-    again = jax.tree.unflatten(structure, leaves)
-    assert isinstance(again, EFFECTS[name])
-    assert eqx.tree_equal(again, effect)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        setattr(effect, next(iter(parameters(effect))), 0.0)
-
-
-@everyone
-def test_copies_of_the_last_row_change_nothing_before_them(
-    name, scattered, base, reading
-):
-    """Rows are padded so, that few executables serve data of every size."""
-    records = scattered(9)
-    rows = len(records.force)
-    there, held = (
-        compiled_chain(base, (typical(name),), seen, reading)
-        for seen in (records, repeat_last_row(records, rows + 8))
-    )
-    np.testing.assert_allclose(held[0][:rows], there[0], rtol=1e-13, atol=1e-12)
-    np.testing.assert_allclose(held[1].sd[:, :rows], there[1].sd, rtol=1e-13)
-    np.testing.assert_array_equal(held[1].log_weight, there[1].log_weight)
-
-
-def mirrored(records):
-    """Return the records of the same movements in tension."""
-    flipped = ("deformation", "direction", "sense", "rate", "force")
-    return dataclasses.replace(
-        records, **{name: -getattr(records, name) for name in flipped}
-    )
-
-
-@everyone
-def test_symmetry_is_as_declared(name, scattered, base, reading):
-    effect, base = typical(name), bare(base)
-    records = scattered(4)
-    if effect.symmetry == "none":
-        return
-    rows = len(records.deformation)
-    there, back = (
-        contribution([effect], (), base, seen, reading)
-        for seen in (records, mirrored(records))
-    )
-    sign = {"odd": -1.0, "even": 1.0}[effect.symmetry]
-    np.testing.assert_allclose(back[:rows], sign * there[:rows], rtol=1e-9, atol=1e-10)
-    # The noise knows no direction.
-    np.testing.assert_allclose(back[rows:], there[rows:], rtol=1e-9, atol=1e-10)
-    moved = there[rows:] if effect.stage == "noise" else there[:rows]
-    assert np.max(np.abs(moved)) > 1e-3
-
-
-@pytest.mark.thorough
-@everyone
-def test_any_two_compose(name, scattered, base, reading):
-    """Each effect before each of the library."""
-    records, first = scattered(7), Compiled(typical(name))
-    alone = predict_reading(base, [first], records, reading)
-    for size in (typical, null):
-        for other in EFFECTS:
-            both = [first, Compiled(size(other))]
-            pair = predict_reading(base, both, records, reading)
-            found = difference(pair, alone, base)
-            assert np.isfinite(found).all(), other
-            if size is null:
-                assert np.max(np.abs(found)) <= 1e-12, other
-
-
-@pytest.mark.parametrize("size", [null, typical])
-def test_the_whole_library_composes(size, scattered, base, reading):
-    records = noisy(scattered(8), base, reading, ())
-    library = tuple(size(name) for name in EFFECTS)
-    found = score_and_slope(library, base, numbers(records), reading)
-    assert np.isfinite(ravel_pytree(found)[0]).all()
-
-
-@pytest.mark.parametrize("groups", [(), ("rig")])
-def test_groups_are_a_tuple_of_names(groups):
-    with pytest.raises(TypeError, match="Own: groups and needs are tuples"):
-
-        class Own(Effect, stage="force", groups=groups): ...
-
-
-def test_abstract_effects_have_no_instances():
     with pytest.raises(TypeError, match="abstract"):
         Effect()
     with pytest.raises(TypeError, match="abstract"):
         Scatter()
 
 
-@everyone
-def test_pickled_and_copied(name):
-    assert eqx.tree_equal(pickle.loads(pickle.dumps(typical(name))), typical(name))
+@every_effect
+def test_a_pytree_that_is_pickled_and_frozen(name):
+    effect = typical(name)
+    leaves, structure = jax.tree.flatten(effect)
+    assert leaves == [about.typical for about in parameters(effect).values()]
+    assert eqx.tree_equal(jax.tree.unflatten(structure, leaves), effect)
+    assert eqx.tree_equal(pickle.loads(pickle.dumps(effect)), effect)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(effect, next(iter(parameters(effect))), 0.0)
+
+
+# --- what it does ---
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_null_changes_nothing(seed, scattered, base, reading):
+    records = scattered(seed)
+    chains = [
+        compiled_chain(base, effects, records, reading) for effects in (library(), ())
+    ]
+    assert np.max(np.abs(difference(*chains, base))) <= 1e-12
+
+
+@every_effect
+def test_it_acts_alone_as_among_others(name, loading, base, reading):
+    records = noisy(loading, base, reading, ())
+    found = contribution([name], base, records, reading)
+    assert np.max(np.abs(found)) > 1e-3
+    alone = predict_reading(base, (typical(name),), records, reading)
+    among = compiled_chain(base, library(name), records, reading)
+    assert np.max(np.abs(difference(among, alone, base))) < 1e-9
+    # None of the others hides it.
+    whole, without = (
+        compiled_chain(base, library(*names), records, reading)
+        for names in (NAMES, {*NAMES} - {name})
+    )
+    assert np.max(np.abs(difference(whole, without, base))) > 1e-4
+
+
+def mirrored(records):
+    """Return the records of the same movements in tension."""
+    signed = ("deformation", "direction", "sense", "rate", "force")
+    return dataclasses.replace(records, **{n: -getattr(records, n) for n in signed})
+
+
+@pytest.mark.parametrize("name", sorted({*EFFECTS} - OF_THE_MOVEMENT))
+def test_tension_is_the_mirror_image_of_compression(name, scattered, base, reading):
+    base, records = bare(base), scattered(4)
+    rows = len(records.deformation)
+    there, back = (
+        contribution([name], base, rows, reading)
+        for rows in (records, mirrored(records))
+    )
+    sign = 1.0 if name in UNCHANGED else -1.0
+    np.testing.assert_allclose(back[:rows], sign * there[:rows], rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(back[rows:], there[rows:], rtol=1e-9, atol=1e-10)
+    moved = there[rows:] if EFFECTS[name].stage == "noise" else there[:rows]
+    assert np.max(np.abs(moved)) > 1e-3
+
+
+@every_effect
+def test_copies_of_the_last_row_change_nothing_before_them(
+    name, scattered, base, reading
+):
+    """Rows are padded so, that few programs serve data of every size."""
+    records = scattered(9)
+    rows, effects = len(records.force), library(name)
+    there, held = (
+        compiled_chain(base, effects, given, reading)
+        for given in (records, repeat_last_row(records, rows + 8))
+    )
+    np.testing.assert_allclose(held[0][:rows], there[0], rtol=1e-13, atol=1e-12)
+    np.testing.assert_allclose(held[1].sd[:, :rows], there[1].sd, rtol=1e-13)
+    np.testing.assert_array_equal(held[1].log_weight, there[1].log_weight)
+
+
+ROWS = [3, 22, 40, 100, 160]
+
+
+def together_and_alone(name, base, records, reading):
+    """Return readings of some rows among all others, and of each row by itself."""
+
+    def mean(rows):
+        return np.asarray(compiled_chain(base, library(name), rows, reading)[0])
+
+    rows = [jax.tree.map(lambda x, i=i: x[i : i + 1], records) for i in ROWS]
+    return mean(records)[ROWS], np.concatenate([mean(row) for row in rows])
+
+
+def test_instantaneous_effects_remember_nothing(base, loading, reading):
+    kept, left = acting(tuple(EFFECTS.values()))
+    assert {*kept, *left} == {*EFFECTS.values()}
+    for effect in kept:
+        whole, alone = together_and_alone(effect.name, base, loading, reading)
+        assert alone == pytest.approx(whole, rel=1e-12, abs=1e-12), effect.name
+        assert effect.stage in ("deformation", "force")
+        # The motion has deformation, speed and temperature; no angle, run or gear.
+        assert not effect.needs & {"angle", "time", "cycles", "runs", "specimens"}
+    for name in ("relaxation", "hysteresis", "stiffness_fatigue"):
+        whole, alone = together_and_alone(name, base, loading, reading)
+        assert np.max(np.abs(alone - whole)) > 1e-3
+
+
+# --- derivatives ---
+
+
+@jax.jit
+def score(effects, base, records, reading):
+    """Return one number to which every stage contributes."""
+    mean, noise = predict_reading(base, effects, records, reading)
+    rows = log_probability(records.force, mean, noise, 0.0, rounded=False)
+    return jnp.sum(rows) + jnp.vdot(jnp.cos(jnp.arange(len(mean))), mean)
+
+
+slopes = jax.jit(jax.grad(score, argnums=(0, 1, 2)))
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_gradients_are_finite(moved, scattered, base, reading):
+    """Also at null, and of a gear that was never touched."""
+    records = scattered(6)
+    if not moved:
+        zero = np.zeros(len(records.deformation))
+        records = dataclasses.replace(records, deformation=zero, rate=zero)
+    records = numbers(noisy(records, base, reading, ()))
+    for names in ((), NAMES, *([name] for name in NAMES)):
+        found = slopes(library(*names), bare(base), records, reading)
+        assert np.isfinite(ravel_pytree(found)[0]).all(), names
+
+
+@jax.jit
+def many_scores(table, records, reading):
+    """Return the score at each row of a table of parameters and deformations."""
+
+    def at(flat):
+        effects, base, deformation = UNRAVEL(flat)
+        read = dataclasses.replace(records, deformation=deformation)
+        return score(effects, base, read, reading)
+
+    return jax.vmap(at)(table)
+
+
+@every_effect
+def test_gradients_are_right(name, scattered, base, reading):
+    """By central differences of fourth order, along random directions."""
+    records, rng = scattered(0), np.random.default_rng(0)
+    mean = compiled_chain(base, library(), records, reading)[0]
+    # Errors of a few sds: larger ones would hide everything else in the score.
+    records = numbers(dataclasses.replace(records, force=mean + rng.normal(size=24)))
+    effects = library(name)
+    found = slopes(effects, base, records, reading)
+    exact = ravel_pytree((found[0], found[1], found[2].deformation))[0]
+    flat = np.asarray(ravel_pytree((effects, base, records.deformation))[0])
+    step = 2e-4 * np.maximum(np.abs(flat), 1e-3) * rng.choice([-1.0, 1.0], len(flat))
+    # Each parameter of effect and base alone, and all deformations together.
+    varied = [e.name == name for e in effects for _ in parameters(e)] + 5 * [True]
+    steps = np.zeros((12, len(flat)))
+    for row, place in enumerate(np.flatnonzero(varied)):
+        steps[row, place] = step[place]
+    steps[-1, -24:] = step[-24:]
+    values = [
+        np.asarray(many_scores(flat + times * steps, records, reading))
+        for times in (1.0, -1.0, 2.0, -2.0)
+    ]
+    slow = (8.0 * (values[0] - values[1]) - (values[2] - values[3])) / 12.0
+    found = steps @ np.asarray(exact)
+    scale = np.maximum(np.abs(found), 1e-3 * np.abs(found).max())
+    assert np.max(np.abs(found - slow) / scale) < 1e-6
+
+
+def test_a_batch_of_libraries_is_each_by_itself(scattered, base, reading):
+    records, each = scattered(3), [library(name) for name in NAMES]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *each)
+    chains = jax.vmap(lambda effects: compiled_chain(base, effects, records, reading))
+    batch = chains(stacked)
+    for index, effects in enumerate(each):
+        alone = compiled_chain(base, effects, records, reading)
+        for fast, slow in zip(*map(jax.tree.leaves, (batch, alone)), strict=True):
+            np.testing.assert_allclose(fast[index], slow, rtol=1e-10, atol=1e-11)
+
+
+# --- what it depends on ---
+
+# Covariates that an effect may depend on only if it needs one of these features.
+# A memory of time or of unloading starts anew with the run or the specimen.
+LICENCES = {
+    "temperature": {"temperature"},
+    "time": {"time", "holds or rates", "rates", "cycles"},
+    "angle": {"angle"},
+    "rate": {"rates", "time"},
+    "sense": {"unloading", "cycles"},
+    "run": {"run", "runs", "time", "cycles", "unloading"},
+    "specimen": {"specimen", "specimens", "cycles", "unloading"},
+}
+# Features, and the covariates of which at least one must then matter.
+CARRIERS = {
+    "temperature": {"temperature"},
+    "time": {"time"},
+    "angle": {"angle"},
+    "rates": {"rate", "time"},
+    "unloading": {"sense", "order"},
+    "holds or rates": {"time"},
+    "cycles": {"order", "time", "sense"},
+    "run": {"run"},
+    "runs": {"run"},
+    "specimen": {"specimen"},
+    "specimens": {"specimen"},
+    "force_sd": {"force_sd"},
+}
+
+
+def changed(records, what):
+    """Return the records with one covariate changed, all else equal."""
+    rng = np.random.default_rng(8)
+    match what:
+        case "time":
+            # Still in order within each run, but at another, uneven pace.
+            change = {"time": 1.7 * records.time + 0.01 * records.time**2}
+        case "sense":
+            change = {"sense": -records.sense, "direction": -records.direction}
+        case "order":
+            # The same deformations, reached the other way round.
+            names = ("deformation", "direction", "sense", "rate")
+            change = {n: getattr(records, n).copy() for n in names}
+            for run in np.unique(records.run):
+                rows = np.flatnonzero(records.run == run)
+                for n, column in change.items():
+                    sign = -1.0 if n != "deformation" else 1.0
+                    column[rows] = sign * getattr(records, n)[rows[::-1]]
+        case "run" | "specimen":
+            rows = len(records.deformation)
+            change = {what: np.sort(rng.integers(0, 3, rows))}
+        case _:
+            column = getattr(records, what)
+            change = {what: column + rng.uniform(1.0, 2.0, len(column))}
+    return dataclasses.replace(records, **change)
+
+
+def matters(name, what, records, base, reading) -> bool:
+    """Return whether a covariate changes what the effect contributes."""
+    before, after = (
+        contribution([name], bare(base), given, reading)
+        for given in (records, changed(records, what))
+    )
+    if what == "force_sd":
+        rows = len(records.deformation)
+        before, after = before[rows:], after[rows:]
+    if what == "order":
+        # The reversed loading has the same deformations in reversed rows.
+        for run in np.unique(records.run):
+            own = np.flatnonzero(records.run == run)
+            after[own] = after[own[::-1]].copy()
+    return bool(np.max(np.abs(after - before)) > 1e-9)
+
+
+@every_effect
+def test_it_depends_on_what_it_needs_and_on_nothing_else(name, loading, base, reading):
+    needs = EFFECTS[name].needs - BEYOND_RECORDS
+    asked = {*LICENCES, *(c for need in needs for c in CARRIERS[need])}
+    used = {what for what in asked if matters(name, what, loading, base, reading)}
+    for covariate in used & LICENCES.keys():
+        assert needs & LICENCES[covariate], covariate
+    for need in needs:
+        assert used & CARRIERS[need], need

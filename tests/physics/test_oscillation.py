@@ -1,25 +1,20 @@
 """The integrated motion is that of the textbook, and of its exact linear twin."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from slices import slice_of
 
 from hdcal import EFFECTS
 from hdcal.data.records import Geometry
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.dynamics import (
     Oscillator,
-    damping_ratio,
     integrate,
     natural_frequency,
     ring_mass,
 )
 from hdcal.physics.forcing import Chirp, SampledForce, Step
-from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.physics.theory import ring
 
@@ -27,7 +22,7 @@ XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
 MASS, STIFFNESS, FORCE = 4e-5, 200.0, 80.0
 PACE = np.sqrt(STIFFNESS / MASS)
 TIMES = np.linspace(0.0, 0.05, 401)
-RATIOS = [0.0, 0.015, 0.3, 1.0, 2.5]
+RATIOS = [0.0, 0.3, 1.0, 2.5]
 
 
 def gear(ratio: float, effects=(), reading=None) -> Oscillator:
@@ -52,7 +47,6 @@ def move(oscillator, force, times):
 
 
 exact_response = jax.jit(linear_response)
-rubbing_response = jax.jit(frictional_response)
 
 
 def step_response(ratio: float, times) -> np.ndarray:
@@ -96,21 +90,14 @@ def test_a_step_is_answered_as_in_the_textbook(ratio):
     assert worst(exact, expected) < 1e-11
 
 
-@pytest.mark.parametrize("ratio", [0.015, 0.3, 2.5])
-@pytest.mark.parametrize("frequency", [5.0, 350.0, 900.0])
+@pytest.mark.parametrize(("ratio", "frequency"), [(0.015, 350.0), (2.5, 5.0)])
 def test_a_sine_is_answered_as_in_the_textbook(ratio, frequency):
     expected = sine_response(ratio, frequency, TIMES)
     found = move(gear(ratio), sine(frequency), TIMES)[:, 0]
     assert worst(found, expected) < 1e-7
 
 
-def test_the_textbook_notices_another_mass():
-    heavier = replace(gear(0.015), mass=1.001 * MASS)
-    found = move(heavier, Step(FORCE), TIMES)[:, 0]
-    assert worst(found, step_response(0.015, TIMES)) > 1e-3
-
-
-@pytest.mark.parametrize("ratio", [0.015, 1.0, 2.5])
+@pytest.mark.parametrize("ratio", [0.015, 1.0])
 def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     rng = np.random.default_rng(1)
     time = np.sort(rng.uniform(0.0, 0.05, 80))
@@ -122,21 +109,6 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
 
 
-def test_the_exact_response_has_exact_gradients_through_critical_damping():
-    time, force = np.linspace(0.0, 0.02, 50), np.linspace(0.0, 30.0, 50)
-
-    @jax.jit
-    def end(ratio):
-        damping = 2.0 * ratio * jnp.sqrt(STIFFNESS * MASS)
-        linear = LinearGear(MASS, damping, STIFFNESS)
-        return linear_response(linear, time, force, jnp.array([0.1, 0.0]))[-1, 0]
-
-    slope, h = jax.jit(jax.grad(end)), 1e-5
-    for ratio in (0.02, 1.0, 3.0):
-        difference = float(end(ratio + h) - end(ratio - h)) / (2.0 * h)
-        assert float(slope(ratio)) == pytest.approx(difference, rel=1e-6)
-
-
 def test_a_sweep_passes_through_its_frequencies():
     sweep = Chirp(1.0, 10.0, 50.0, 2.0)
     # The phase grows by the mean frequency times the duration: sixty turns.
@@ -146,43 +118,41 @@ def test_a_sweep_passes_through_its_frequencies():
     assert np.diff(near)[0] / -1e-6 == pytest.approx(2.0 * np.pi * 50.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("friction", slice_of([2.0, 20.0, 100.0], [20.0]))
+@pytest.mark.parametrize("friction", [2.0, 20.0])
+def test_dry_friction_takes_four_times_itself_of_each_swing(friction):
+    """Half a swing goes from one side of (F ∓ f)/k to the other, then the gear rests.
+
+    To 3 % of f/k, the range in which friction holds a gear without load.
+    """
+    rubbed = gear(0.0, (EFFECTS["coulomb_friction"](force=friction),))
+    halves = np.arange(5) * np.pi / PACE
+    found = move(rubbed, Step(FORCE), np.append(halves, 100.0 * halves[1]))[:, 0]
+    expected, sense = [0.0], 1.0
+    for _ in halves[1:]:
+        turn, middle = expected[-1], (FORCE - sense * friction) / STIFFNESS
+        rests = abs(FORCE - STIFFNESS * turn) <= friction
+        expected.append(turn if rests else 2.0 * middle - turn)
+        sense = -sense
+    assert found[:-1] == pytest.approx(expected, abs=0.03 * friction / STIFFNESS)
+    assert abs(found[-1] - FORCE / STIFFNESS) < 1.03 * friction / STIFFNESS
+
+
 @pytest.mark.parametrize(
-    ("force", "end", "rows"),
+    ("effect", "held"),
     [
-        (Step(FORCE), 0.05, 800),
-        (sine(0.1), 2.6, 40_000),
-        (sine(5.0), 0.3, 5_000),
-        (sine(100.0), 0.05, 10_000),
-        (sine(350.0), 0.05, 40_000),
+        (EFFECTS["load_friction"](share=0.1), lambda y, way: 0.1 * STIFFNESS * y * way),
+        (EFFECTS["coulomb_friction"](force=8.0), lambda y, way: 8.0 * way),
     ],
-    ids=["step", "0.1 Hz", "5 Hz", "100 Hz", "350 Hz"],
 )
-def test_dry_friction_sticks_and_slips_as_in_the_closed_form(
-    friction, force, end, rows
-):
-    """To 3 % of f/k, the range in which friction holds a gear without load."""
-    rubbed = gear(0.015, (EFFECTS["coulomb_friction"](force=friction),))
-    times = np.linspace(0.0, end, 201)
-    found = move(rubbed, force, times)[:, 0]
-    fine = np.linspace(0.0, end, rows + 1)
-    exact = rubbing_response(
-        LinearGear(MASS, rubbed.damping, STIFFNESS),
-        friction,
-        fine,
-        np.asarray(jax.vmap(force)(fine)),
-        np.zeros(2),
-    )[:: rows // 200, 0]
-    assert np.max(np.abs(found - exact)) < 0.03 * friction / STIFFNESS
-
-
-def test_friction_of_a_load_sticks_in_a_slow_motion():
-    """Quasi-static, k (1 ± μ) y = F on the way out and back."""
-    rubbed = gear(0.015, (EFFECTS["load_friction"](share=0.1),))
-    times = np.array([0.0, 2.4, 4.9])
-    found = np.asarray(move(rubbed, sine(0.1), times)[1:, 0])
+def test_friction_sticks_and_slips_in_a_slow_motion(effect, held):
+    """Quasi-static, k y ± f(y) = F on the way out and back; it sticks at the turn."""
+    times = np.array([0.0, 2.4, 2.6, 4.9])
+    found = np.asarray(move(gear(0.015, (effect,)), sine(0.1), times)[1:, 0])
     loads = FORCE * np.sin(0.2 * np.pi * times[1:])
-    assert found == pytest.approx(loads / (STIFFNESS * np.array([1.1, 0.9])), rel=0.005)
+    for y, load, way in zip(found[[0, 2]], loads[[0, 2]], (1.0, -1.0), strict=True):
+        assert STIFFNESS * y + held(y, way) == pytest.approx(load, rel=0.005)
+    largest = (FORCE - held(found[0], 1.0)) / STIFFNESS
+    assert found[1] == pytest.approx(largest, rel=0.005)
 
 
 def test_hardening_raises_the_frequency_and_keeps_the_energy():
@@ -195,14 +165,6 @@ def test_hardening_raises_the_frequency_and_keeps_the_energy():
     assert y.min() > -1e-3
     assert worst(energy, FORCE * y) < 2e-3
     assert y.max() < step_response(0.0, TIMES).max() - 0.05
-
-
-def test_a_diametral_reading_has_the_same_frequency():
-    half = gear(0.015, (), Reading(0.5, 20.0))
-    k = float(half.stiffness)
-    assert k == pytest.approx(0.5 * STIFFNESS)
-    assert natural_frequency(0.5 * MASS, k) == pytest.approx(PACE / (2.0 * np.pi))
-    assert damping_ratio(0.5 * MASS, 0.5 * half.damping, k) == pytest.approx(0.015)
 
 
 def test_the_mass_of_the_ring_is_rayleighs():

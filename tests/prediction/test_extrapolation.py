@@ -92,16 +92,6 @@ def test_there_is_no_step_at_the_ends_or_in_the_middle(make, at: float):
         assert np.ptp(force) < 1e-3
 
 
-def test_bands_and_margin_agree():
-    posterior = single(size=1000)
-    for at in (0.3, 0.6, 0.8):
-        bands = hdcal.predict(posterior, [at])
-        force = hdcal.margin(posterior, at).worst.force_N
-        for end in ENDS:
-            found = getattr(bands, f"physics_{end}_N")[0]
-            assert found == pytest.approx(getattr(force, end), rel=1e-9)
-
-
 def width(posterior, at: float) -> float:
     found = hdcal.margin(posterior, at).worst.force_N
     return found.hi - found.lo

@@ -126,6 +126,3 @@ def test_bounds_cover(population: str, size: int):
         assert shortfall(hits[:, FAIR, content]) > LEVEL
         assert shortfall(hits[:, HALVED, content]) < LEVEL
     assert shortfall(hits[:, PREDICTIVE, 0]) < LEVEL
-
-
-WARM, ALPHA, ALPHA_SD, ZERO_SD, FRAME_SD = 80.0, 3e-4, 4e-5, 0.1, 1e-3

@@ -10,7 +10,6 @@ from posteriors import single, spring
 import hdcal
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
-from hdcal.prediction.shares import share_findings
 
 
 @pytest.fixture(scope="module")
@@ -102,15 +101,6 @@ def test_a_deformation_far_from_the_readings_is_a_slip_of_the_unit():
         assert fields(refused) == ["deformation"]
 
 
-def test_a_load_needs_the_place_of_first_contact(one):
-    records = one.case.records
-    far = replace(records, deformation=records.deformation + 5.0)
-    shifted = replace(one, case=replace(one.case, records=far))
-    with pytest.raises(InputError) as refused:
-        hdcal.margin(shifted, 5.4, quantity="load")
-    assert fields(refused) == ["quantity"]
-
-
 def test_models_have_probabilities_and_are_of_the_same_data(one):
     other = replace(one, case=replace(one.case, data_sha256="1" * 64))
     for models in (
@@ -126,11 +116,3 @@ def test_models_have_probabilities_and_are_of_the_same_data(one):
         with pytest.raises(InputError) as refused:
             hdcal.margin(models, 0.4)
         assert fields(refused) == ["models"]
-
-
-def test_shares_are_limited_by_the_draws_and_by_the_model():
-    outside = share_findings({"content": 1.0, "confidence": 0.0}, 1000)
-    assert [finding.where for finding in outside] == ["content", "confidence"]
-    rare = share_findings({"content": 1.0 - 1e-10, "confidence": 0.995}, 1000)
-    assert {finding.where for finding in rare} == {"content", "confidence"}
-    assert not share_findings({"content": 0.99, "confidence": 0.95}, 1000)

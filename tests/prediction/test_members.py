@@ -41,12 +41,6 @@ def test_a_quantile_is_the_inverse_of_the_share(level: float):
     assert one.quantile(level)[0, 0] == pytest.approx(stats.norm.ppf(level, 7.0, 1.0))
 
 
-def test_a_far_tail_keeps_its_digits():
-    one = Members(np.ones(1), np.ones((1, 1)), np.zeros((1, 1, 1)), np.ones((1, 1, 1)))
-    for far in (5.0, 10.0, 30.0):
-        assert one.above(far)[0, 0] == pytest.approx(stats.norm.sf(far), rel=1e-9)
-
-
 def test_members_without_scatter_are_one_force():
     same = Members(
         np.ones(1), np.full((1, 2), 0.5), np.full((1, 1, 2), 7.0), np.zeros((1, 1, 2))

@@ -216,13 +216,3 @@ def test_unloading_begins_at_the_largest_tested_deformation(name: str):
             assert centre[0, row] == pytest.approx(expected, abs=1e-6), (back, place)
     gap = found[False].centre - found[True].centre
     assert np.all(gap[:, :2] > 1.0)
-
-
-def test_a_seed_decides_what_the_draws_leave_open():
-    (model,) = models_of(batch(6, 200))
-    at = Conditions.of(0.7, 60.0)
-    one, two, other = (
-        simulate(model, at, "specimens", seed=seed).centre for seed in (1, 1, 2)
-    )
-    np.testing.assert_array_equal(one, two)
-    assert not np.array_equal(one, other)

@@ -1,4 +1,7 @@
-"""Ways to look at one effect of the registry, shared by the tests of effects."""
+"""One effect among all others of the library at their null values.
+
+The structure is that of the whole library, so that one compiled chain serves all.
+"""
 
 import dataclasses
 
@@ -9,39 +12,14 @@ import pytest
 from readings import draw_reading
 
 from hdcal import EFFECTS
-from hdcal.inference.likelihood import log_probability
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, parameters
 
-# What no table of readings on the gear holds: an effect that needs it is never tested.
+# Features that no table of readings on the gear has: such an effect is never tested.
 BEYOND_RECORDS = frozenset({"bare_rig"})
 
-everyone = pytest.mark.parametrize("name", sorted(EFFECTS))
+every_effect = pytest.mark.parametrize("name", sorted(EFFECTS))
 compiled_chain = jax.jit(predict_reading)
-
-
-@jax.jit
-def _applied(effect, signal, rows):
-    return effect.apply(signal, rows)
-
-
-@dataclasses.dataclass(frozen=True)
-class Compiled:
-    """An effect whose contribution is a program of its own.
-
-    The chain around it runs as it stands: so many chains share a few programs.
-    """
-
-    effect: Effect
-
-    @property
-    def stage(self) -> str:
-        """The stage of the effect."""
-        return self.effect.stage
-
-    def apply(self, signal, rows):
-        """Return the signal as the effect leaves it."""
-        return _applied(self.effect, signal, rows)
 
 
 def typical(name: str, **changes: float) -> Effect:
@@ -59,49 +37,39 @@ def null(name: str) -> Effect:
     return typical(name, **amplitudes)
 
 
+def library(*names: str) -> tuple[Effect, ...]:
+    """Return the library, these effects at their typical sizes and the others null."""
+    return tuple(typical(n) if n in names else null(n) for n in EFFECTS)
+
+
 def bare(base: Base) -> Base:
-    """Return the base without anything that mixes with an effect."""
+    """Return the base without offsets and loss of modulus."""
     return Base(base.stiffness, 0.0, 0.0, 0.0, base.sigma)
-
-
-def density(errors, noise):
-    """Return the probability density of errors at every row [1/N]."""
-    grid = errors[:, None, None] / noise.sd
-    each = jnp.exp(noise.log_weight[:, None] - 0.5 * grid**2) / noise.sd
-    return jnp.sum(each, axis=1) / np.sqrt(2.0 * np.pi)
 
 
 def difference(chain, other, base) -> np.ndarray:
     """Return how readings and noise of two chains differ, as one vector.
 
-    The noise is a mixture, so what counts is its density, here at a few errors.
+    The noise is a mixture: its density at a few errors is compared.
     """
-    errors = base.sigma * jnp.array([0.0, 0.7, 2.0, 4.0])
-    parts = [
-        np.concatenate([mean, np.ravel(density(errors, noise))])
-        for mean, noise in (chain, other)
-    ]
-    return parts[0] - parts[1]
+    errors = base.sigma * np.array([0.0, 0.7, 2.0, 4.0])
+
+    def vector(mean, noise):
+        grid = errors[:, None, None] / noise.sd
+        each = np.exp(noise.log_weight[:, None] - 0.5 * grid**2) / noise.sd
+        density = np.sum(each, axis=1) / np.sqrt(2.0 * np.pi)
+        return np.concatenate([mean, np.ravel(density)])
+
+    return vector(*chain) - vector(*other)
 
 
-def contribution(effects, others, base, records, reading) -> np.ndarray:
+def contribution(names, base, records, reading) -> np.ndarray:
     """Return what effects add to the reading and to its noise, as one vector."""
-    with_effects, without = (
-        compiled_chain(base, tuple(chosen), records, reading)
-        for chosen in ((*others, *effects), others)
+    chains = (
+        compiled_chain(base, library(*chosen), records, reading)
+        for chosen in (names, ())
     )
-    return difference(with_effects, without, base)
-
-
-@jax.jit
-def score(effects, base, records, reading):
-    """Return one number to which every stage contributes."""
-    mean, noise = predict_reading(base, effects, records, reading)
-    rows = log_probability(records.force, mean, noise, 0.0, rounded=False)
-    return jnp.sum(rows) + jnp.vdot(jnp.cos(jnp.arange(len(mean))), mean)
-
-
-score_and_slope = jax.jit(jax.value_and_grad(score, argnums=(0, 1, 2)))
+    return difference(*chains, base)
 
 
 def noisy(loading, base, reading, effects):

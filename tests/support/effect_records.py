@@ -6,26 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
+from rigs import make_records
 
 from hdcal.data.records import Geometry, Records
 from hdcal.physics.chain import Base, Reading
 
-EVERYTHING = frozenset(
-    {
-        "temperature",
-        "time",
-        "angle",
-        "force_sd",
-        "run",
-        "specimen",
-        "unloading",
-        "holds",
-        "holds or rates",
-        "rates",
-        "cycles",
-        "runs",
-        "specimens",
-    }
+EVERYTHING = (
+    *("temperature", "time", "angle", "force_sd", "run", "specimen", "runs"),
+    *("specimens", "unloading", "holds", "holds or rates", "rates", "cycles"),
 )
 
 
@@ -50,34 +38,28 @@ def reading() -> Reading:
 @pytest.fixture(scope="session")
 def loading() -> Records:
     """Three gears at three temperatures: up, hold, down fast; up and down slowly."""
-    top = 0.54
-    deformation = np.concatenate(
-        [
-            np.linspace(0.0, top, 20),
-            np.full(5, top),
-            np.linspace(top, 0.0, 16)[1:],
-            np.linspace(0.0, top, 11)[1:],
-            np.linspace(top, 0.0, 11)[1:],
-        ]
-    )
-    step = np.repeat([1.0, 20.0, 1.0, 8.0, 8.0], [20, 5, 15, 10, 10])
-    direction = np.repeat([1.0, 0.0, -1.0, 1.0, -1.0], [20, 5, 15, 10, 10])
-    sense = np.where(direction == 0.0, 1.0, direction)
+    top, counts = 0.54, [20, 5, 15, 10, 10]
+    ends = [(0.0, top), (top, top), (top, 0.0), (0.0, top), (top, 0.0)]
+    parts = [
+        np.linspace(*end, count + 1)[1:]
+        for end, count in zip(ends, [19, *counts[1:]], strict=True)
+    ]
+    deformation = np.concatenate([[0.0], *parts])
+    step = np.repeat([1.0, 20.0, 1.0, 8.0, 8.0], counts)
+    direction = np.repeat([1.0, 0.0, -1.0, 1.0, -1.0], counts)
     rate = np.diff(deformation, prepend=-top / 19) / step
-    rows = 3 * len(deformation)
-    return Records(
-        deformation=np.tile(deformation, 3),
-        temperature=np.repeat([20.0, 80.0, 50.0], len(deformation)),
-        time=np.tile(np.cumsum(step), 3),
-        angle=np.linspace(0.0, 6.0 * np.pi, rows),
-        direction=np.tile(direction, 3),
-        sense=np.tile(sense, 3),
-        rate=np.tile(rate, 3),
-        run=np.repeat([0, 1, 2], len(deformation)),
-        specimen=np.repeat([0, 1, 2], len(deformation)),
-        force=np.zeros(rows),
-        force_sd=np.zeros(rows),
+    gear = np.repeat([0, 1, 2], len(deformation))
+    return make_records(
+        np.tile(deformation, 3),
         known=EVERYTHING,
+        temperature=np.array([20.0, 80.0, 50.0])[gear],
+        time=np.tile(np.cumsum(step), 3),
+        angle=np.linspace(0.0, 6.0 * np.pi, len(gear)),
+        direction=np.tile(direction, 3),
+        sense=np.tile(np.where(direction == 0.0, 1.0, direction), 3),
+        rate=np.tile(rate, 3),
+        run=gear,
+        specimen=gear,
     )
 
 
@@ -86,12 +68,11 @@ def scattered() -> Callable[[int], Records]:
     """Return a maker of records without any order or sense, three runs of eight."""
 
     def make(seed: int) -> Records:
-        rng = np.random.default_rng(seed)
-        rows = 24
-        run = np.repeat([0, 1, 2], 8)
-        sense = rng.choice([-1.0, 1.0], rows)
-        return Records(
-            deformation=rng.uniform(-0.5, 0.5, rows),
+        rng, rows = np.random.default_rng(seed), 24
+        run, sense = np.repeat([0, 1, 2], 8), rng.choice([-1.0, 1.0], rows)
+        return make_records(
+            rng.uniform(-0.5, 0.5, rows),
+            known=EVERYTHING,
             temperature=rng.uniform(-20.0, 90.0, rows),
             time=np.tile(np.cumsum(rng.uniform(1.0, 60.0, 8)), 3),
             angle=rng.uniform(0.0, 2.0 * np.pi, rows),
@@ -102,7 +83,6 @@ def scattered() -> Callable[[int], Records]:
             specimen=run,
             force=rng.normal(0.0, 60.0, rows),
             force_sd=rng.uniform(0.0, 0.5, rows),
-            known=EVERYTHING,
         )
 
     return make

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from posteriors import written_posterior
 
 from hdcal.data.case import Case
@@ -15,9 +14,6 @@ from hdcal.inference.posterior import Posterior
 _COLUMNS = ("deformation", "force", "direction", "sense", "rate")
 _DRAWS = ("force_offset", "deformation_offset", "run_offset")
 _DRAWS += ("thermal_zero_drift.slope", "displacement_nonlinearity.curvature")
-
-# Keys whose sentences hold numbers with their sign: those are for other tests.
-WORDS = ("remarks", "extrapolated", "answer", "headline", "next_step", "warnings")
 
 
 def mirrored_case(case: Case) -> Case:
@@ -46,19 +42,3 @@ def mirrored(posterior: Posterior) -> Posterior:
         effects=[effect.name for effect in posterior.effects],
         with_gap=posterior.problem.discrepancy is not None,
     )
-
-
-def check_same(found, expected, place: str = "margin") -> None:
-    """Require two answers to be one, numbers to a billionth."""
-    if isinstance(expected, dict):
-        assert found.keys() == expected.keys()
-        for name in expected.keys() - {*WORDS}:
-            check_same(found[name], expected[name], f"{place}.{name}")
-    elif isinstance(expected, (tuple, list)):
-        assert len(found) == len(expected), place
-        for row, pair in enumerate(zip(found, expected, strict=True)):
-            check_same(*pair, f"{place}[{row}]")
-    elif isinstance(expected, float):
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-12), place
-    else:
-        assert found == expected, place

@@ -1,21 +1,16 @@
 """Make-believe vibration tests: a gear that was released, and the truth about it."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
+from posteriors import written_posterior
 from rigs import make_case, make_gear, make_records
-from structures import form_of
+from scipy.integrate import solve_ivp
 
-from hdcal import EFFECTS, Posterior
-from hdcal.data.priors import dynamic_priors, effect_priors
-from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import Convergence
-from hdcal.inference.posterior import STRUCTURE
-from hdcal.inference.posterior_tree import data_groups, dataset
-from hdcal.inference.problem import problem_priors, unit_stiffness
-from hdcal.physics.frictional_response import frictional_response
+from hdcal import EFFECTS
+from hdcal.data.priors import dynamic_priors
+from hdcal.inference.problem import unit_stiffness
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 TRUTH = {
@@ -62,18 +57,28 @@ def moving_case(seed: int, gear=None, truth=TRUTH, rows: int = 200):
     return make_case(make_records(read, force, **columns), case.gear)
 
 
-def frictional_case(seed, ratio, friction, gear=None, rows: int = 200):
+def frictional_case(seed, ratio, friction):
     """Return a case of a released gear with a damping ratio and dry friction [N]."""
     truth = TRUTH | {"damping_ratio": ratio}
-    case = moving_case(seed, gear, truth, rows)
-    time, force = release(rows)
-    linear = motion(truth, case)
-    start = np.array([force[0] / linear.stiffness, 0.0])
-    smooth = np.asarray(linear_response(linear, time, force, start))[:, 0]
-    rubbed = frictional_response(linear, friction, time, force, start)
-    read = case.records.deformation - smooth + np.asarray(rubbed)[:, 0]
-    known = {"known": {"time"}, "time": time}
-    return make_case(make_records(read, force, **known), case.gear)
+    case = moving_case(seed, None, truth)
+    (time, force), linear = release(), motion(truth, case)
+
+    def moved(rubbing: float) -> np.ndarray:
+        """Integrate, with the sign of friction changing over 10 µm/s."""
+
+        def rates(at, state):
+            drag = linear.damping * state[1] + rubbing * np.tanh(state[1] / 0.01)
+            push = np.interp(at, time, force) - drag - linear.stiffness * state[0]
+            return [state[1], push / linear.mass]
+
+        start = [force[0] / linear.stiffness, 0.0]
+        exact = {"method": "Radau", "rtol": 1e-7, "atol": 1e-9, "max_step": 1e-3}
+        # Held, the gear has no error of integration.
+        with np.errstate(divide="ignore"):
+            return solve_ivp(rates, time[[0, -1]], start, t_eval=time, **exact).y[0]
+
+    read = case.records.deformation + (moved(friction) - moved(0.0))
+    return make_case(make_records(read, force, known={"time"}, time=time), case.gear)
 
 
 GEAR = """\
@@ -96,49 +101,27 @@ def write_moving(case, folder: Path) -> Path:
     return folder
 
 
-def still_posterior(
-    effects: dict | None = None, *, usable: bool = True, gap=None, **spread
-):
-    """Return a calibration at rest with draws made by hand, no sampler needed.
+def still_posterior(effects: dict | None = None, *, gap=None, K: float = 0.0):
+    """Return a calibration at rest of which only K is uncertain.
 
     Args:
-        effects: value of each `effect.parameter`, the same in every draw.
-        usable: whether its checks passed.
-        gap: weights of the leftover discrepancy, the same in every draw, or None.
-        spread: relative sd of K over the draws, as `K`.
+        effects: value of each `effect.parameter`.
+        gap: weights of the leftover discrepancy, or None.
+        K: relative sd of K over the draws.
     """
-    rng = np.random.default_rng(0)
-    gear = moving_gear()
-    deformation = np.linspace(0.02, 0.54, 14)
-    chosen = tuple({EFFECTS[name.partition(".")[0]]: None for name in effects or {}})
-    known = frozenset().union(*(effect.needs for effect in chosen))
+    names = dict.fromkeys(name.partition(".")[0] for name in effects or {})
+    known = frozenset().union(*(EFFECTS[name].needs for name in names))
+    deformation, size = np.linspace(0.02, 0.54, 14), 200
     records = make_records(deformation, 200.0 * deformation, known=known)
-    case = make_case(records, gear)
-    shape = (2, 100)
-    influence = TRUTH["K"] * np.exp(spread.get("K", 0.0) * rng.standard_normal(shape))
-    fixed = {"E0": 207e3, "alpha": 3e-4, "deformation_offset": 0.0}
-    fixed |= {"noise_correlation": 0.0} | (effects or {})
-    draws = {name: np.full(shape, value) for name, value in fixed.items()}
-    unit = unit_stiffness(case, "ring")
-    draws |= {"K": influence, "stiffness": influence * 207e3 * unit}
-    draws |= {"force_offset": np.zeros(shape), "sigma": np.ones(shape)}
+    case = make_case(records, moving_gear())
+    scatter = np.random.default_rng(0).standard_normal(size)
+    influence = TRUTH["K"] * np.exp(K * scatter)
+    values = {"E0": 207e3, "alpha": 3e-4, "deformation_offset": 0.0, "sigma": 1.0}
+    values |= {"force_offset": 0.0, **(effects or {})}
+    draws = {name: np.full(size, value) for name, value in values.items()}
+    stiffness = influence * 207e3 * unit_stiffness(case, "ring")
+    draws |= {"K": influence, "stiffness": stiffness}
     if gap is not None:
-        draws |= {"gap_weights": np.tile(gap, (*shape, 1))}
-        draws |= {name: np.ones(shape) for name in ("gap_sd", "gap_length")}
-    groups = {"posterior": dataset(draws), **data_groups(records)}
-    tree = xr.DataTree.from_dict(groups)
-    driven = Convergence(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
-    check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
-    settings = {
-        "with_gap": gap is not None,
-        STRUCTURE: asdict(form_of(case, chosen, gap is not None)),
-        "seed": 0,
-        "chains": 2,
-        "warmup": 1,
-        "draws": 100,
-    }
-    settings |= {"seconds": 0.0, "versions": {}}
-    priors = problem_priors(case, chosen, effect_priors(), "ring")
-    return Posterior(
-        case, "ring", chosen, priors, tree, {"K": driven}, (check,), settings
-    )
+        draws |= {"gap_weights": np.tile(gap, (size, 1))}
+        draws |= {name: np.ones(size) for name in ("gap_sd", "gap_length")}
+    return written_posterior(case, draws, effects=names, with_gap=gap is not None)

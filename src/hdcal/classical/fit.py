@@ -138,6 +138,7 @@ def fit(
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
     x, y = np.asarray(records.deformation), np.asarray(records.force)
+    degrees = [int(degree) for degree in degrees]
     for degree in degrees:
         rank = np.linalg.matrix_rank(_columns(x / np.abs(x).max(), degree, True))
         if rank <= degree or rank == len(x):

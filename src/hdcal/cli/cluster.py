@@ -1,4 +1,4 @@
-"""Work shared by a Dask cluster; the workers need no disk of ours."""
+"""Tasks on a Dask cluster; the workers need no shared disk."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -18,9 +18,9 @@ _GO_ON = "what was answered is kept; run the same command again to go on"
 def completed_on_cluster(
     work: Callable, tasks: Iterator[tuple], address: str, lost: str = _GO_ON
 ) -> Iterator[Any]:
-    """Yield what `work` makes of every task, in the order in which they are done.
+    """Yield the result of `work` for every task, in the order in which they end.
 
-    What a lost worker had begun goes to another one; each result comes once.
+    Tasks of a lost worker go to another one; each result comes once.
 
     Args:
         work: can be imported by name on the workers.
@@ -60,7 +60,7 @@ def _client(address: str) -> Iterator[Any]:
     except ImportError:
         words = "Dask's package 'distributed' is not installed"
         raise _refusal(words, "Install hdcal[cluster], or leave it out") from None
-    # What a lost connection means is said once, by whoever catches it. Dask gives
+    # A lost connection is reported once, where it is caught. Dask gives
     # its loggers levels and handlers of their own, so that no parent quiets them.
     for name in list(logging.root.manager.loggerDict):
         if name.startswith("distributed"):

@@ -1,4 +1,4 @@
-"""A command of hdcal: what is found about a parameter is said of its option."""
+"""A command that reports findings about parameters as findings about options."""
 
 import re
 from dataclasses import replace
@@ -13,7 +13,7 @@ _NAMED = re.compile(r"`(\w+)`")
 
 
 class Command(click.Command):
-    """A command whose findings name options where the library names parameters."""
+    """A command whose findings name its options instead of the parameters."""
 
     def invoke(self, ctx: click.Context):
         """Run the command.
@@ -40,7 +40,7 @@ def _of_options(finding: Finding, options: dict[str, str]) -> Finding:
 
 
 def _shown(parameter: click.Parameter) -> str:
-    """Return how a user writes a parameter: --option, or the name of an argument."""
+    """Return a parameter as users write it: --option, or the name of an argument."""
     if isinstance(parameter, click.Option):
         return parameter.opts[0]
     return parameter.human_readable_name.strip("[]")

@@ -1,4 +1,4 @@
-"""Where words go: results on standard output, everything else beside it."""
+"""Output of a command: results on standard output, messages on standard error."""
 
 import contextlib
 import io
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def _read_too(out: str) -> list[Finding]:
-    """Return a finding where a result would take the place of what it is made from."""
+    """Return a finding where a result would replace its own input."""
     context = click.get_current_context(silent=True)
     if context is None:
         return []
@@ -46,11 +46,11 @@ class Console:
 
     def __init__(self, *, json: bool):
         self.json = json
-        # What the options' texts held that could not be read.
+        # Findings about options and input, collected before the work.
         self.wrong = Findings()
         # Where the result goes; `reserve_folder` sets it.
         self.folder: Target | None = None
-        # Whether what reads the output went away.
+        # Whether the reader of the output is gone.
         self.unread = False
 
     def prepare(self) -> None:
@@ -65,7 +65,7 @@ class Console:
                 stream.reconfigure(errors="backslashreplace")
         if os.environ.get("HDCAL_DEBUG") == "1":
             return
-        # Heard before jaxlib loads: its C++ log goes past Python's streams.
+        # Set before jaxlib loads: its C++ log bypasses Python's streams.
         os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
         logging.getLogger("jax").setLevel(logging.ERROR)
         logging.getLogger("absl").setLevel(logging.ERROR)
@@ -89,7 +89,7 @@ class Console:
     def reserve_folder(
         self, out: str | None, force: bool, replace: str = "force"
     ) -> None:
-        """Reserve the result folder, or note why there can be none, before any work.
+        """Reserve the result folder before any work, or add a finding.
 
         Args:
             out: the folder to make, or None.
@@ -213,12 +213,12 @@ def _to_error(show: Callable[[], None]) -> None:
     try:
         show()
     except OSError:
-        # Where words cannot go, nobody can be told.
+        # A message that cannot be written cannot be reported either.
         _discard(sys.stderr)
 
 
 def discard_output() -> None:
-    """Send standard output nowhere, once nobody reads it any more."""
+    """Send standard output nowhere, once its reader is gone."""
     _discard(sys.stdout)
 
 

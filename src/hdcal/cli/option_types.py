@@ -25,7 +25,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?0,\d+\s*")
 
 
 class Parsed(click.ParamType):
-    """An option's text, read by hdcal; what cannot be read is said with all else.
+    """An option's text, read by hdcal; errors are reported together.
 
     Args:
         name: shown in the help.
@@ -130,17 +130,17 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
     raise _refused(option, words, "Write it like 0.38:0.42")
 
 
-def read_whole_numbers(text: str, option: str) -> list[int]:
-    """Read a list of whole numbers.
+def read_tones(text: str, option: str) -> list[float]:
+    """Read 5 or 5:200 as numbers.
 
     Raises:
-        InputError: it is none.
+        InputError: it is neither.
     """
     try:
-        return [int(part) for part in text.split(",")]
+        return [float(part) for part in text.split(":")]
     except ValueError:
-        words = f"'{text}' is no list of whole numbers"
-        raise _refused(option, words, "Write it like 1,3") from None
+        remedy = "Write it like 5, or 5:200 for a chirp"
+        raise _refused(option, f"'{text}' is no frequency", remedy) from None
 
 
 def read_grid(text: str, option: str) -> list[float]:
@@ -282,9 +282,8 @@ def read_list(texts: Sequence[str], option: str) -> list[str]:
 ENDS = Parsed("LO:HI", read_ends)
 DEFORMATIONS = Parsed("START:STOP:COUNT", read_deformations)
 NUMBERS = Parsed("LIST", read_grid)
-# Temperatures whose worst counts: a window is spread over eleven.
+# Temperatures of which the worst counts: a window is spread over eleven.
 WINDOW = Parsed("FROM:TO", partial(read_window, count=11))
-WHOLE_NUMBERS = Parsed("LIST", read_whole_numbers)
 FORCE = Parsed("N", partial(read_quantity, unit="N"))
 LENGTH = Parsed("MM", partial(read_quantity, unit="mm"))
 STRESS = Parsed("MPA", partial(read_quantity, unit="MPa"))

@@ -1,6 +1,5 @@
 """Options that several commands share."""
 
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
@@ -10,7 +9,6 @@ from click.core import ParameterSource
 
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
-    FORCE,
     read_all,
     read_columns,
     read_list,
@@ -116,39 +114,12 @@ def take_reading(settings: dict) -> dict:
 
 
 def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
-    """Read the case that `case_options` named; the console collects what is wrong.
-
-    On a terminal it asks for what the gear file leaves open.
-    """
+    """Read the case that `case_options` named; the console collects what is wrong."""
     from hdcal.data.reading import read_case
 
     if columns is None:  # The console has that finding already.
         return None
-    read = partial(read_case, columns=columns)
-    case = console.wrong.attempt(read, data, gear, **how)
-    reading = asked_reading(console, case)
-    if reading is None:
-        return case
-    how["reading"] = reading
-    return console.wrong.attempt(read, data, gear, **how)
-
-
-def asked_reading(console: Console, case: "Case | None") -> str | None:
-    """Ask on a terminal whether the deformation is radial or diametral.
-
-    Returns:
-        The answer; None where the gear file says it, or nobody can be asked.
-    """
-    from hdcal.data.reading import leaves_reading_open
-
-    streams = sys.stdin, sys.stderr
-    asks = all(each is not None and each.isatty() for each in streams)
-    asks = asks and not console.json
-    if case is None or not asks or not leaves_reading_open(case.gear):
-        return None
-    words = "Deformation as read, radial or diametral"
-    kinds = click.Choice(READINGS)
-    return click.prompt(words, default="radial", type=kinds, err=True)
+    return console.wrong.attempt(read_case, data, gear, columns=columns, **how)
 
 
 library_option = click.option(
@@ -225,24 +196,6 @@ tolerance_option = repeated_option(
     read=partial(read_named, read=partial(read_quantity, unit="mm")),
     help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
 )
-decision_options = combined(
-    click.option(
-        "--limit-force",
-        type=FORCE,
-        help="Capacity of the actuator [N]: its size, in compression and in tension.",
-    ),
-    click.option(
-        "--rule",
-        type=click.Choice(["guarded", "simple"]),
-        help="Decision about it, by the expanded uncertainty or not "
-        "[default: guarded].",
-    ),
-)
-certificate_option = click.option(
-    "--certificate",
-    is_flag=True,
-    help="Also write a certificate to sign, one A4 page.",
-)
 seed_option = click.option(
     "--seed",
     default=0,
@@ -265,21 +218,9 @@ sampling_options = combined(
 
 
 def is_given(name: str) -> bool:
-    """Tell whether a parameter stands on the command line, readable or not."""
+    """Return whether a parameter was given on the command line, readable or not."""
     source = click.get_current_context().get_parameter_source(name)
     return source is ParameterSource.COMMANDLINE
-
-
-def needs_folder(name: str, given: bool, out: str | None) -> list[Finding]:
-    """Return a finding where a parameter was given that needs a result folder.
-
-    Args:
-        name: of the parameter.
-        given: whether it was.
-        out: the folder, or None.
-    """
-    words, remedy = "is written into a result folder", "Give `out` too"
-    return [Finding(name, words, remedy)] if given and out is None else []
 
 
 def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:

@@ -19,6 +19,8 @@ from hdcal.versions import versions
 
 # Draws of each result that are compared with those of the others.
 _DRAWS = 4000
+# Ends of tested ranges that differ by more than this share of the widest range.
+_OTHER_RANGE = 0.2
 
 
 class Compared(Item):
@@ -35,6 +37,13 @@ class Compared(Item):
         "probability of a difference larger than the tolerance"
     )
     case: InstanceOf[Case] = Field(exclude=True)
+    has_leftover: bool = Field(exclude=True)
+
+    @property
+    def tested(self) -> tuple[float, float]:
+        """Least and largest deformation of the readings [mm]."""
+        at = np.asarray(self.case.records.deformation)
+        return float(at.min()), float(at.max())
 
     @property
     def differs(self) -> bool:
@@ -59,6 +68,13 @@ class Comparison(Result):
     interval: float = 0.95
     versions: dict[str, str] = Field(default_factory=versions)
     stiffness: Draws
+
+    @property
+    def ranges_differ(self) -> bool:
+        """Whether the tested ranges differ by more than a fifth of the widest one."""
+        ends = np.array([one.tested for one in self.results])
+        widest = np.max(np.ptp(ends, axis=1))
+        return bool(np.max(np.ptp(ends, axis=0)) > _OTHER_RANGE * widest)
 
     @computed_field
     @property
@@ -129,4 +145,5 @@ def _compared(named, draws, first, tolerance: float | None) -> Compared:
         probability_stiffer=float(np.mean(apart > 0.0) + np.mean(apart == 0.0) / 2.0),
         probability_differs=beyond,
         case=case,
+        has_leftover=any(one.problem.discrepancy is not None for one in models),
     )

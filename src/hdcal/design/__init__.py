@@ -1,4 +1,4 @@
-"""Which sizes, which spring?"""
+"""Designs: sizes that keep limits, springs of wave generators, parameter studies."""
 
 # Sizes that may be varied [mm], and what else a study may vary.
 SIZE_NAMES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")

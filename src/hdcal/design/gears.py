@@ -16,19 +16,20 @@ from hdcal.data.plausible import implausible
 from hdcal.data.priors import Prior, material_names, material_priors, read_material
 from hdcal.data.records import Geometry
 from hdcal.data.theory_names import SPRING, Theory
-from hdcal.design.gear_forces import (
-    MODULUS,
-    SIZES,
-    GearModel,
-    Models,
-    stiffness_ratio,
-)
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
+from hdcal.inference.residuals import noise_warnings
 from hdcal.physics.profile import peak_stress
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.conditions import Conditions
+from hdcal.prediction.joint import JointModel, joint
+from hdcal.prediction.models import Models, averaging_words
+from hdcal.prediction.simulate import gear_forces
+from hdcal.prediction.sizes import SIZES, stiffness_ratio
 
 Sizes = Mapping[str, Any]
+# Site of a draw: its modulus over that of the tested gear, in another material.
+MODULUS = "_modulus"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,9 @@ class Gears:
         facts: priors and facts of the material in use.
         values: draws by site, in code units: [draw, …].
         independent: effective number of draws.
-        model: of the tested gear; None where only priors are known.
+        model: of the tested gear, all models as one; None where only priors are known.
+        seed: of what the draws leave open.
+        notes: unresolved causes and faults of the noise, in sentences.
         sense: +1 for gears that are pressed, −1 for gears that are pulled.
         shifts: of sizes from the drawing [mm], by name, (draw,).
         deviation: of the stiffness from the tested mean, relative, (draw,).
@@ -55,7 +58,9 @@ class Gears:
     facts: dict[str, Prior]
     values: Mapping[str, np.ndarray]
     independent: float
-    model: GearModel | None = None
+    model: JointModel | None = None
+    seed: int = 0
+    notes: tuple[str, ...] = ()
     sense: int = 1
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
     deviation: np.ndarray | float = 0.0
@@ -107,11 +112,28 @@ class Gears:
         at, warm = self.sense * np.asarray(deformation), np.asarray(temperature)
         factor, values = np.broadcast_to(factor, (self.size, len(at))), self.values
         if self.model is not None:
-            return self.sense * self.model.forces(values, at, warm, factor)
+            return self.sense * self._model_forces(self.model, at, warm, factor)
         unit = float(THEORIES[self.gear.K_theory](self.gear.geometry, 1.0))
         loss = values["alpha"] * (warm[:, None] - self.gear.reference_temperature)
         stiffness = values["K"] * values["E0"] * unit * (1.0 - loss) * factor.T
         return self.sense * stiffness * at[:, None]
+
+    def _model_forces(self, model: JointModel, deformation, temperature, factor):
+        """Return the force by the model [N], (n, draw), loaded from the free shape.
+
+        Neither zeros nor drift of gauges belong to it.
+        """
+        place = deformation / model.problem.reading.radial_per_read
+        at = Conditions.of(
+            place,
+            temperature,
+            np.where(place < 0.0, -1.0, 1.0),
+            quantity="gear",
+            factor=factor * np.reshape(self.values.get(MODULUS, 1.0), (-1, 1)),
+        )
+        # Another modulus is in the factor; its loss with temperature is not.
+        draws = model.draws | {"alpha": self.values["alpha"]}
+        return gear_forces(model, at, draws, seed=self.seed).T
 
     def stresses(self, sizes: Sizes, deformation: float, temperature: Any):
         """Return the largest hoop bending stress over temperatures [MPa], (draw,)."""
@@ -132,8 +154,10 @@ class Gears:
         """
         rng, deviation = np.random.default_rng(seed), 0.0
         shifts = {n: rng.uniform(-w, w, self.size) for n, w in tolerances.items()}
-        if self.model is not None and self.model.specimens:
-            deviation = self.model.specimen_sd() * rng.normal(size=self.size)
+        if self.model is not None and (tested := self.model.problem.specimens):
+            # A new gear also has the distance of the tested mean from the population's.
+            sd = self.values["specimen_sd"] * (1.0 + 1.0 / tested) ** 0.5
+            deviation = sd * rng.normal(size=self.size)
         return replace(self, shifts=shifts, deviation=deviation, sense=sense)
 
     def of_material(self, name: str, seed: int) -> "Gears":
@@ -165,10 +189,11 @@ def draw_gears(given: Models | Gear | Gears, seed: int = 0, count: int = 4000) -
     if wrong := implausible("seed", seed):
         raise InputError(wrong)
     if isinstance(given, Gear):
-        gear, theory, model = given, given.theory, None
+        gear, theory, model, notes = given, given.theory, None, ()
     else:
-        model = GearModel.of(given, seed)
-        gear, theory = model.case.gear, model.theory
+        model = joint(given)
+        notes = (*averaging_words(given), *noise_warnings(model.posterior))
+        gear, theory = model.posterior.case.gear, model.posterior.theory
     if theory == SPRING:
         words = "has no sizes, and a design changes sizes"
         remedy = "Calibrate with the sizes of the gear and another theory"
@@ -179,7 +204,8 @@ def draw_gears(given: Models | Gear | Gears, seed: int = 0, count: int = 4000) -
     facts = material_priors(gear.material) if shipped else {}
     own = gear, theory, gear.material, facts
     if model is not None:
-        return Gears(*own, model.values, model.independent, model)
+        known = model.draws, model.independent_draws, model
+        return Gears(*own, *known, seed=seed, notes=notes)
     rng, priors = np.random.default_rng(seed), gear.priors.items()
     values = {name: sample_prior(prior, name, rng, count) for name, prior in priors}
     return Gears(*own, values, count)

@@ -20,11 +20,11 @@ from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import fault, requested, within
 from hdcal.design import request
 from hdcal.design.charts import limit_chart
-from hdcal.design.gear_forces import Models
 from hdcal.design.gears import Gears, Sizes, draw_gears
 from hdcal.design.nearest_point import CLOSE, nearest_kept
 from hdcal.design.result import DesignResult, Stress, shared_fields
 from hdcal.errors import Finding, Findings, InputError
+from hdcal.prediction.models import Models
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Interval, Probability, quantity
 

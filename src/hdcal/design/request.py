@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from hdcal.data.gear_file.validation import fault, within
-from hdcal.design.gear_forces import SIZES, matters
 from hdcal.design.gears import Gears
+from hdcal.prediction.sizes import SIZES, matters
 from hdcal.report.item import Item
 
 # More than this loss of Young's modulus is a slip of the unit [-].

@@ -101,7 +101,7 @@ def shared_fields(
     if gears.scatters:
         kind = "prior predictive" if prior else "predictive"
     if gears.model is not None:
-        records = gears.model.case.records
+        records = gears.model.posterior.case.records
         radial = np.asarray(records.deformation) * gears.radial_per_read
         for name, asked, tested, near in (
             ("deformation", deformation, radial, 1e-9),

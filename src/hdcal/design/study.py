@@ -12,11 +12,12 @@ from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import requested, within
 from hdcal.design import request
 from hdcal.design.charts import study_chart
-from hdcal.design.gear_forces import SIZES, Models
 from hdcal.design.gears import Gears, draw_gears
 from hdcal.design.result import DesignResult, shared_fields
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.physics.profile import peak_stress
+from hdcal.prediction.models import Models
+from hdcal.prediction.sizes import SIZES
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Item
 
@@ -162,7 +163,8 @@ def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
     Deformations [mm], temperatures [°C] and stiffnesses over that of the tested gear
     have the shape (d,).
     """
-    if gears.model is None or not gears.model.effects:
+    effects = gears.model.effects if gears.model is not None else ()
+    if not any(effect.stage == "force" for effect in effects):
         # A positive factor does not change the ranks of draws: the quantiles of the
         # tested gear hold for all sizes.
         (at, warm), which = np.unique([at, warm], axis=1, return_inverse=True)

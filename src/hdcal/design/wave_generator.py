@@ -9,12 +9,12 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import fault, requested, within
 from hdcal.design.charts import balance_chart
-from hdcal.design.gear_forces import Models
 from hdcal.design.gears import Gears, draw_gears
 from hdcal.design.request import Asked, Window, ascending, check_sizes, gears_of
 from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
 from hdcal.design.springs import Kept, Spring, SpringGap, judge_all, kept_at
 from hdcal.errors import Finding, InputError
+from hdcal.prediction.models import Models
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import Interval, quantity
 

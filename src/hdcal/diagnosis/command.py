@@ -5,7 +5,6 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
-    asked_reading,
     force_option,
     json_option,
     library_option,
@@ -66,9 +65,6 @@ def diagnose(console: Console, cases, out, force, **settings):
         reading, asked = take_reading(settings), None
         if reading["columns"] is not None:
             asked = wrong.attempt(read_cases, cases, **reading)
-            told = asked_reading(console, asked.found[0]) if asked else None
-            if told is not None:
-                asked = wrong.attempt(read_cases, cases, **reading | {"reading": told})
         if out is None and asked is not None:
             out = asked.folder
         console.reserve_folder(out, force)

@@ -1,1 +1,1 @@
-"""How does a gear move under a force, and what did its motion tell?"""
+"""Motion of a gear under a force: its response, and calibration from a record."""

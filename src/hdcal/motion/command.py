@@ -6,13 +6,35 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.force_options import force_options, read_drive
-from hdcal.cli.options import json_option, seed_option
+from hdcal.cli.option_types import FORCE, Parsed, read_columns, read_tones
+from hdcal.cli.options import json_option, repeated_option, seed_option
+from hdcal.errors import Finding
 
 
 @command(short_help="How a calibrated gear moves under a force over time.")
 @click.argument("run", metavar="RUN")
-@force_options
+@click.option(
+    "--force",
+    required=True,
+    metavar="F.csv|step|sine|chirp",
+    help="The force on the gear: a table with time_s and force_N, or a shape.",
+)
+@repeated_option(
+    "--column",
+    "columns",
+    metavar="QUANTITY=HEADER",
+    read=read_columns,
+    help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
+)
+@click.option("--amplitude", type=FORCE, help="Of a shape [N] [default: 80].")
+@click.option(
+    "--frequency",
+    type=Parsed("HZ", read_tones),
+    help="Of a sine [Hz]: 5; of a chirp its first and last: 5:200.",
+)
+@click.option(
+    "--duration", type=float, metavar="S", help="Of a shape [s] [default: 0.5]."
+)
 @click.option("--temperature", type=float, help="Of the gear [°C] [default: tested].")
 @click.option("--mass-kg", "mass", type=float, help="Moved mass [default: prior].")
 @click.option("--damping", type=float, help="Damping c [N·s/mm] [default: prior].")
@@ -30,14 +52,21 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
 
     Units: N, mm, s, Hz, kg, N·s/mm. Motion begins at rest.
     """
-    out = out if out is not None else f"{Path(run).resolve().name}-response"
-    with console.wrong:
-        console.reserve_folder(out, replace, "replace")
-        drive = read_drive(console, force, columns, asked["amplitude"])
+    from hdcal.data.measurements.force_table import read_force
     from hdcal.inference.model_average import load_models
+    from hdcal.motion.drive import SHAPES
     from hdcal.motion.dynamic_problem import DynamicPosterior
     from hdcal.motion.respond import respond as compute
 
+    out, drive = out or f"{Path(run).resolve().name}-response", force
+    with console.wrong as wrong:
+        console.reserve_folder(out, replace, "replace")
+        if force not in SHAPES:
+            drive = wrong.attempt(read_force, force, columns or {})
+            if asked["amplitude"] is not None:
+                words = "a sampled force has its own"
+                wrong.append(Finding("amplitude", words, "Leave it out"))
+    assert drive is not None
     if asked["mass"] is not None:
         asked["mass"] *= 1e-3  # 1 kg = 1e-3 N·s²/mm
     given = {name: value for name, value in asked.items() if value is not None}

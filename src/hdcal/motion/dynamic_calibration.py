@@ -1,7 +1,6 @@
 """Calibration of mass, damping and stiffness from the record of a gear in motion."""
 
 import time
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from hdcal.data.case import Case, Theory, require_case, require_force
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings
 from hdcal.exported import jit
 from hdcal.inference.assembly import (
     MOST_LOG_LIKELIHOODS,
@@ -28,9 +27,7 @@ from hdcal.motion.dynamic_problem import (
     pointwise,
     predict_motion,
 )
-from hdcal.motion.mode_search import friction_peak, highest_peak
-from hdcal.physics.effect import Effect
-from hdcal.physics.effects.loops import CoulombFriction
+from hdcal.motion.mode_search import highest_peak
 
 FEWEST_ROWS = 20
 _WHITE, _RATE = "residuals are noise", "rows resolve the vibration"
@@ -44,7 +41,6 @@ _DERIVED = ("stiffness", "damping", "natural_frequency")
 def calibrate_dynamic(
     case: Case,
     *,
-    effects: Sequence[str] = (),
     theory: Theory | None = None,
     chains: int = 4,
     warmup: int = 1000,
@@ -52,14 +48,13 @@ def calibrate_dynamic(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> DynamicPosterior:
-    """Calibrate m ÿ + c ẏ + k y = F(t), or with dry friction, against a time series.
+    """Calibrate m ÿ + c ẏ + k y = F(t) against a time series.
 
     The force is the input, as read and linear between the rows; the deformation is the
     output, y plus an offset plus white noise; k follows the temperature.
 
     Args:
         case: from `read_case`; one run, with time.
-        effects: `coulomb_friction`, or none.
         theory: overrides the gear's theory.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain.
@@ -71,39 +66,22 @@ def calibrate_dynamic(
         The posterior; it may have failed its checks, see `Posterior.usable`.
 
     Raises:
-        InputError: the record or an effect does not suit the model.
+        InputError: the record does not suit the model.
     """
     require_case(case)
     require_force(case, "calibrate with --dynamic")
     check_settings(chains, warmup, draws, seed)
-    acting = friction_effects(effects)
     _check_record(case)
     began, theory = time.perf_counter(), theory or case.gear.theory
-    priors = dynamic_site_priors(case, theory, acting)
-    problem = build_dynamic(case, dynamic_site_priors(case, theory), theory)
+    priors = dynamic_site_priors(case, theory)
+    problem = build_dynamic(case, priors, theory)
     mode, rival = highest_peak(problem)
-    if acting:
-        linear, problem = problem, build_dynamic(case, priors, theory, acting)
-        mode = friction_peak(linear, mode, problem)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     sampled = sample(problem, mode, seed, progress=progress, **size)
     specifics = _specifics(problem, sampled, rival)
     parts = assemble(case, priors, problem, sampled, seed=seed, **specifics)
     settings = {"seed": seed, **size, "with_gap": False, **run_settings(sampled, began)}
-    return DynamicPosterior(case, theory, acting, priors, *parts, settings)
-
-
-def friction_effects(names: Sequence[str]) -> tuple[type[Effect], ...]:
-    """Look up the effects of a gear in motion: none, or dry friction.
-
-    Raises:
-        InputError: the model has no such effect.
-    """
-    if others := sorted({*names} - {CoulombFriction.name}):
-        words = f"the model of a moving gear does not hold '{', '.join(others)}'"
-        remedy = f"It holds {CoulombFriction.name} only: leave the others out"
-        raise InputError([Finding("effects", words, remedy)])
-    return (CoulombFriction,) if names else ()
+    return DynamicPosterior(case, theory, (), priors, *parts, settings)
 
 
 def _check_record(case: Case) -> None:
@@ -173,22 +151,14 @@ def whiteness_check(problem: DynamicProblem, values) -> Check:
     p = chdtrc(len(lags), rows * (rows + 2) * np.sum(share**2 / (rows - lags)))
     if p >= _LEAST_P:
         return Check(_WHITE, "passed", f"no correlation over rows (p = {p:.2g})")
-    model = "model with dry friction" if problem.effects else "linear model"
-    words = f"residuals are correlated from row to row (p = {p:.1g}): the {model} does "
+    words = f"residuals are correlated from row to row (p = {p:.1g}): the model does "
     return Check(_WHITE, "warning", words + "not hold, the intervals are too narrow")
 
 
 def _rate_check(problem: DynamicProblem, values) -> Check:
-    """Check that the force may be taken as linear between the rows.
-
-    The response with dry friction is wrong where a step is half a period or more.
-    """
+    """Check that the force may be taken as linear between the rows."""
     steps = np.diff(problem.time[: problem.count]) * float(values["natural_frequency"])
     words = f"{1.0 / np.median(steps):.1f} rows per period"
-    if problem.effects and np.max(steps) >= 0.5:
-        remedy = "leave coulomb_friction out"
-        words = f"rows are up to {np.max(steps):.2g} periods apart: {remedy}"
-        return Check(_RATE, "failed", words)
     if np.median(steps) * _LEAST_PER_PERIOD <= 1.0:
         return Check(_RATE, "passed", words)
     remedy = "the force between rows is taken as straight; sample faster"

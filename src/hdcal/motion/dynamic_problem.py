@@ -4,11 +4,10 @@ The force is the input, taken as read and linear between the rows; the deformati
 the output, read with an offset and white noise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import numpyro
@@ -16,7 +15,6 @@ from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.prior import Prior, scaled
-from hdcal.data.priors import effect_priors
 from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
@@ -35,17 +33,13 @@ from hdcal.inference.problem import (
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.values import Values, where_read, with_gains
 from hdcal.physics.dynamics import natural_frequency, ring_mass
-from hdcal.physics.effect import Effect
-from hdcal.physics.effects.loops import CoulombFriction
-from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
 
-# Parameters of the oscillation; K, E0 and gauges come before them, friction after.
+# Parameters of the oscillation; K, E0 and gauges come before them.
 SITES = (
     *("alpha", "mass", "damping_ratio", "deformation_offset", "initial_deformation"),
     *("initial_velocity", "deformation_sigma"),
 )
-FRICTION = f"{CoulombFriction.name}.force"
 _ring_mass = jit(ring_mass, static_argnames=("radial_per_read",))
 
 
@@ -61,7 +55,6 @@ class DynamicProblem(Sampled):
         force: on the gear, as read [N]; the padding holds the last value.
         deformation: as read [mm], padded.
         count: measured rows.
-        effects: in the model: none, or dry friction.
     """
 
     priors: dict[str, Prior]
@@ -72,38 +65,28 @@ class DynamicProblem(Sampled):
     force: Float[Array, " n"]
     deformation: Float[Array, " n"]
     count: int
-    effects: tuple[type[Effect], ...] = eqx.field(static=True, default=())
-
-    @property
-    def non_smooth(self) -> bool:
-        """Whether the density has kinks: with friction, where a swing is added."""
-        return bool(self.effects)
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
         values = sample_stiffness(self.priors)
-        for name in (*SITES, FRICTION) if self.effects else SITES:
+        for name in SITES:
             values[name] = sample_site(name, self.priors[name])
         for name, value in oscillation(self, values).items():
             numpyro.deterministic(name, value)
         numpyro.factor("deformation", log_likelihood(self, values))
 
 
-def dynamic_site_priors(
-    case: Case, theory: Theory, effects: Sequence[type[Effect]] = ()
-) -> dict[str, Prior]:
+def dynamic_site_priors(case: Case, theory: Theory) -> dict[str, Prior]:
     """Return the priors of all parameters.
 
     Raises:
         InputError: the moved mass has none.
     """
     gear = case.gear
-    table = {**effect_priors(gear.full_scale), **gear.effect_priors, **gear.priors}
-    table |= {**gear.dynamic_priors, **gear.gauge_priors}
+    table = {**gear.priors, **gear.dynamic_priors, **gear.gauge_priors}
     table["mass"] = mass_prior(gear, case_reading(case).radial_per_read)
     table["K"] = influence_prior(case, theory)
-    names = ["K", "E0", *gear.gauge_priors, *SITES, *([FRICTION] if effects else [])]
-    return {name: table[name] for name in names}
+    return {name: table[name] for name in ("K", "E0", *gear.gauge_priors, *SITES)}
 
 
 def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
@@ -129,10 +112,7 @@ def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
 
 
 def build_dynamic(
-    case: Case,
-    priors: Mapping[str, Prior],
-    theory: Theory,
-    effects: Sequence[type[Effect]] = (),
+    case: Case, priors: Mapping[str, Prior], theory: Theory
 ) -> DynamicProblem:
     """Return the inference problem of a case, with priors of `dynamic_site_priors`."""
     records, reading = case.records, case_reading(case)
@@ -148,7 +128,6 @@ def build_dynamic(
         force=padded.force,
         deformation=padded.deformation,
         count=count,
-        effects=tuple(effects),
     )
 
 
@@ -184,11 +163,7 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
     gear = LinearGear(*(with_gains(values, part) for part in parts))
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
     rows = problem.time, problem.force, start
-    if problem.effects:
-        states = frictional_response(gear, values[FRICTION], *rows)
-    else:
-        states = linear_response(gear, *rows)
-    return states[:, 0] + values["deformation_offset"]
+    return linear_response(gear, *rows)[:, 0] + values["deformation_offset"]
 
 
 def motion_rows(problem: DynamicProblem, values: Values) -> np.ndarray:
@@ -215,8 +190,8 @@ def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
 class DynamicPosterior(Posterior):
     """A dynamic calibration: draws in code units, priors, checks and provenance.
 
-    It has no offset of the force and no effect but dry friction: forces are predicted
-    from a calibration at rest.
+    It has no offset of the force and no effects: forces are predicted from a
+    calibration at rest.
     """
 
     kind: ClassVar[str] = "dynamic"
@@ -236,4 +211,4 @@ class DynamicPosterior(Posterior):
     @cached_property
     def moving(self) -> DynamicProblem:
         """The inference problem that was sampled."""
-        return build_dynamic(self.case, self.priors, self.theory, self.effects)
+        return build_dynamic(self.case, self.priors, self.theory)

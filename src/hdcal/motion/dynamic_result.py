@@ -41,13 +41,12 @@ class DynamicCalibration(PosteriorResult):
 
     template = "motion/dynamic.md.j2"
 
-    format: Literal["hdcal.dynamic-calibration/2"] = "hdcal.dynamic-calibration/2"
+    format: Literal["hdcal.dynamic-calibration/3"] = "hdcal.dynamic-calibration/3"
     parameters: dict[str, ParameterEstimate] = Field(json_schema_extra={**_REQUIRED})
     natural_frequency_Hz: Interval = quantity("natural frequency", "Hz")
     damped_frequency_Hz: Interval = quantity("frequency with damping", "Hz")
     damping_ratio: Interval = quantity("damping ratio ζ")
     damping_N_s_per_mm: Interval = quantity("damping c", "N·s/mm")
-    effects: tuple[str, ...]
     bands: pd.DataFrame = Field(exclude=True)
 
     @computed_field
@@ -76,7 +75,6 @@ def dynamic_calibration_of(posterior: DynamicPosterior) -> DynamicCalibration:
         damped_frequency_Hz=Interval.of(damped),
         damping_ratio=Interval.of(ratio),
         damping_N_s_per_mm=Interval.of(draws["damping"]),
-        effects=tuple(effect.name for effect in posterior.effects),
         bands=motion_bands(posterior),
     )
 

@@ -2,9 +2,7 @@
 
 The density of an oscillation has a narrow peak at its frequency and lower ones beside
 it. At a given frequency and damping the linear model is linear in the other parameters,
-so a scan by least squares shows all peaks. Dry friction adds a peak for each number of
-swings before the gear rests: the search for it begins with the largest swings alone,
-whose envelope has one peak, and adds rows.
+so a scan by least squares shows all peaks.
 """
 
 from dataclasses import replace
@@ -19,12 +17,7 @@ from hdcal.inference.checks import Check
 from hdcal.inference.distributions import frozen, moments
 from hdcal.inference.laplace import Whitening
 from hdcal.inference.padding import measured
-from hdcal.motion.dynamic_problem import (
-    FRICTION,
-    DynamicProblem,
-    motion_rows,
-    stiffness_shares,
-)
+from hdcal.motion.dynamic_problem import DynamicProblem, stiffness_shares
 from hdcal.physics.linear_response import fit_linear
 
 ONE_FREQUENCY = "one natural frequency explains the data"
@@ -41,9 +34,6 @@ _FINENESS, _FEWEST, _MOST = 0.25, 60, 6000
 _WINDOW, _AT_ONCE = 2048, 262_144
 # Parts of a prior outside of which no search begins.
 _TAILS = 1e-3, 1.0 - 1e-3
-# Shares of the loss that are friction where a search begins, the last one in stages;
-# and shares of the largest swing down to which the stages reach.
-_SHARES, _SWINGS = (0.05, 0.2, 0.5), (0.5, 0.25, 0.1)
 
 
 def highest_peak(problem: DynamicProblem) -> tuple[Whitening, Check]:
@@ -179,42 +169,3 @@ def _as_sites(problem: DynamicProblem, values) -> dict[str, float]:
             scale = values["E0"] if name == "K" else 1.0
             sites["_KE0" if name == "K" else name] = float(value * scale)
     return sites
-
-
-def friction_peak(
-    linear: DynamicProblem, mode: Whitening, problem: DynamicProblem
-) -> Whitening:
-    """Return the highest peak of a model with dry friction.
-
-    Args:
-        linear: the same without friction.
-        mode: of the linear model.
-        problem: with dry friction.
-    """
-    values = laplace.values_at(linear, mode.centre)
-    moved, frequency = motion_rows(linear, values), float(values["natural_frequency"])
-    # The friction that takes of a swing A what damping does: π c ω A/4.
-    pace = 2.0 * np.pi * frequency
-    equivalent = np.pi * float(values["damping"]) * pace * np.ptp(moved) / 8.0
-    fits = []
-    for share in _SHARES:
-        ratio = (1.0 - share) * float(values["damping_ratio"])
-        shared = {**values, "damping_ratio": ratio, FRICTION: share * equivalent}
-        start = _as_sites(problem, {name: shared[name] for name in problem.priors})
-        for count in _stages(linear, frequency) if share == _SHARES[-1] else ():
-            part = replace(problem, count=count)
-            start = laplace.sites_at(part, laplace.fit(part, start).centre)
-        fits.append(laplace.fit(problem, start))
-    level = [float(laplace.potential(problem, fit.centre)) for fit in fits]
-    return fits[int(np.nanargmin(level))]
-
-
-def _stages(problem: DynamicProblem, frequency: float) -> list[int]:
-    """Return the numbers of rows of the stages, the whole record left out."""
-    read = np.asarray(problem.deformation)[: problem.count]
-    step = float(np.median(np.diff(problem.time[: problem.count])))
-    period = int(np.clip(round(1.0 / (frequency * step)), 2, len(read)))
-    windows = np.lib.stride_tricks.sliding_window_view(read, period)
-    sizes = np.ptp(windows, axis=1)
-    ends = {np.flatnonzero(sizes >= s * sizes.max())[-1] + period for s in _SWINGS}
-    return sorted(int(end) for end in ends if end < problem.count)

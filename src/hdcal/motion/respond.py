@@ -5,7 +5,6 @@ damping are drawn from their priors, which the result states.
 """
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
 
 import jax
@@ -15,23 +14,15 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.data.case import require_force
 from hdcal.data.plausible import implausible
-from hdcal.errors import Finding, Findings, NotUsable
-from hdcal.exported import jit
+from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.problem import case_reading
 from hdcal.motion.charts import response_chart
 from hdcal.motion.drive import Drive, Force, make_drive
 from hdcal.motion.dynamic_problem import mass_prior
-from hdcal.motion.gear_force import CalibratedGears, Models, leftover_force
-from hdcal.physics.chain import Base
-from hdcal.physics.dynamics import (
-    Oscillator,
-    acting,
-    damping_ratio,
-    integrate,
-    natural_frequency,
-)
-from hdcal.physics.effect import parameters
+from hdcal.motion.gear_force import CalibratedGears, Models
+from hdcal.motion.integration import integrate_all
+from hdcal.physics.dynamics import acting, damping_ratio, natural_frequency
 from hdcal.report.chart_spec import Chart
 from hdcal.report.item import INTERVAL, TAILS, Count, Interval, Item, Words, quantity
 from hdcal.report.provenance import gear_rows
@@ -40,9 +31,8 @@ from hdcal.report.result import Result
 Driver = Literal["data", "prior", "given"]
 # A longer motion takes minutes, and its band says nothing new.
 _MOST_SWINGS = 20_000
-# Draws that are integrated together, and the largest number of their states;
-# and points whose quantiles are computed together.
-_CHUNK, _MOST_STATES, _POINTS = 250, 1_000_000, 10_000
+# Points whose quantiles are computed together.
+_POINTS = 10_000
 _COLUMNS = tuple(f"deformation_{end}_mm" for end in ("lo", "median", "hi"))
 _BAND = (
     "equal-tailed pointwise credible band of the deformation of gears like the tested "
@@ -138,7 +128,7 @@ def respond(
 ) -> Response:
     """Predict the deformation over time under a force on the gear.
 
-    IntegratedMotion begins at rest, from the unloaded gear.
+    The motion begins at rest, from the unloaded gear.
 
     Args:
         models: from `calibrate`, `diagnose` or `calibrate_dynamic`.
@@ -175,7 +165,7 @@ def respond(
     values = gears.draw(draws, seed)
     m, c, k = _coefficients(gears, values, at, given, seed)
     _check_reach(gears, drive, m, k)
-    deformation, peak = _integrate_all(gears, drive, at, (values, m, c))
+    deformation, peak = integrate_all(gears, drive, at, values, m, c)
     # Quantiles are computed of a copy: part by part it takes little memory.
     parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
     band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
@@ -215,64 +205,6 @@ def _check_reach(gears: CalibratedGears, drive: Drive, m, k) -> None:
             words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
             remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
             wrong.append(Finding("duration", words, remedy))
-
-
-def _integrate_all(
-    gears: CalibratedGears, drive: Drive, at: float, draws: tuple
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deformation of every draw, (draw, n), and its largest size [mm].
-
-    Raises:
-        NotUsable: some motions do not come to their end.
-    """
-    case, (kept, _) = gears.posterior.case, acting(gears.effects)
-    about = case_reading(case), at, drive.force, drive.times, case.gear.reach
-    count, times = len(draws[1]), len(drive.times)
-    size = max(min(_CHUNK, _MOST_STATES // times), 1)
-    motion, peak = np.empty((count, times)), np.empty(count)
-    done, gone = np.empty(count, bool), np.empty(count, bool)
-    # A computation of JAX does not react to an interruption: it runs in a thread.
-    pool = ThreadPoolExecutor(1)
-    try:
-        for first in range(0, count, size):
-            rows = slice(first, first + size)
-            part = jax.tree.map(lambda each, rows=rows: each[rows], draws)
-            moved = pool.submit(_computed, part, *about, kept=kept).result()
-            motion[rows], peak[rows], done[rows], gone[rows] = moved
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-    if gone.any():
-        words = f"{np.count_nonzero(gone)} of {count} gears give way under this force"
-        remedy = "ask for a smaller amplitude, or measure that far, pulled and pushed"
-        raise NotUsable(f"{words}, up to {case.gear.reach:g} mm: {remedy}")
-    if not done.all():
-        words = f"{np.count_nonzero(~done)} of {count} motions could not be integrated"
-        raise NotUsable(f"{words}: ask for a shorter duration")
-    return motion, peak
-
-
-def _computed(*given, kept):
-    return jax.device_get(_moved(*given, kept=kept))
-
-
-@jit(static_argnames=("kept",))
-def _moved(draws, reading, at, force, times, reach, *, kept):
-    """Return deformation, peak and outcome of each draw."""
-
-    def one(draw):
-        value, mass, damping = draw
-        effects = tuple(
-            effect(**{n: value[f"{effect.name}.{n}"] for n in parameters(effect)})
-            for effect in kept
-        )
-        stiffness = value["stiffness"] / reading.radial_per_read
-        base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
-        leftover = leftover_force(value)
-        gear = Oscillator(mass, damping, base, effects, reading, at, leftover)
-        motion = integrate(gear, force, times, reach)
-        return motion.deformation, motion.largest, motion.done, motion.gone
-
-    return jax.vmap(one)(draws)
 
 
 def _estimates(gears: CalibratedGears, given, m, c, k, peak) -> Estimates:

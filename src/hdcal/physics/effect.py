@@ -17,7 +17,6 @@ from jaxtyping import Float
 from hdcal.data.records import Array, Records
 
 Stage = Literal["deformation", "force", "sensor", "noise"]
-Symmetry = Literal["odd", "even", "none"]
 PerRow = Float[Array, " n"]
 
 
@@ -85,10 +84,8 @@ class Effect(eqx.Module, ABC):
 
     Attributes:
         stage: where in the measurement chain it acts.
-        groups: of `physics.groups`; effects of a group look alike or share a remedy.
+        family: kind of mechanism, such as "loop" or "rig".
         needs: features of the records without which it cannot be tested.
-        symmetry: how the contribution changes from compression to tension: `odd`
-            (changes sign), `even` (does not) or `none` (neither, or by history).
         instantaneous: whether it is a force or play of the gear itself that depends
             on deformation, speed and temperature of the moment only; `hdcal respond`
             includes such effects and leaves others out.
@@ -96,41 +93,33 @@ class Effect(eqx.Module, ABC):
         period: name of the shape parameter that is a period in radial deformation
             [mm], for an effect with several amplitudes. Records shorter than one
             period cannot show the effect, unless its prior says so.
-        twin: a mechanism outside the library that obeys the same equation.
     """
 
     name: ClassVar[str]
     stage: ClassVar[Stage]
-    groups: ClassVar[tuple[str, ...]]
+    family: ClassVar[str]
     needs: ClassVar[frozenset[str]]
-    symmetry: ClassVar[Symmetry]
     instantaneous: ClassVar[bool]
     mixture: ClassVar[bool]
     period: ClassVar[str]
-    twin: ClassVar[str]
 
     def __init_subclass__(
         cls,
         *,
         stage: Stage | None = None,
-        groups: Sequence[str] = (),
+        family: str = "",
         needs: Sequence[str] = (),
-        symmetry: Symmetry = "odd",
         instantaneous: bool = False,
         mixture: bool = False,
         period: str = "",
-        twin: str = "",
     ) -> None:
         if stage is None:
             return
-        if not groups or isinstance(groups, str) or isinstance(needs, str):
-            words = "groups and needs are tuples of names, and groups is not empty"
-            raise TypeError(f"{cls.__name__}: {words}")
+        if not family or isinstance(needs, str):
+            raise TypeError(f"{cls.__name__}: give a family, and needs as a tuple")
         cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
-        cls.stage, cls.groups = stage, tuple(groups)
-        cls.needs, cls.symmetry = frozenset(needs), symmetry
-        cls.instantaneous, cls.mixture = instantaneous, mixture
-        cls.period, cls.twin = period, twin
+        cls.stage, cls.family, cls.needs = stage, family, frozenset(needs)
+        cls.instantaneous, cls.mixture, cls.period = instantaneous, mixture, period
 
     @abstractmethod
     def apply(self, signal: Any, rows: Rows) -> Any:

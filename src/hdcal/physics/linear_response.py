@@ -73,17 +73,13 @@ def applied(matrix: tuple[Scalar, ...], state: State) -> State:
     return a * state[0] + b * state[1], c * state[0] + d * state[1]
 
 
-def following(gear: LinearGear, slope: Scalar, force: Scalar) -> State:
-    """Return the state that follows the force F₀ + s t without vibration."""
-    rate = slope / gear.stiffness
-    return (force - gear.damping * rate) / gear.stiffness, rate
-
-
 def whole_steps(gear: LinearGear, time, force) -> tuple[tuple[Scalar, ...], State]:
     """Return matrix and gain of all steps: state ← matrix · state + gain."""
     step = jnp.diff(time)
     matrix = decay_entries(gear, step)
-    level, rate = following(gear, jnp.diff(force) / step, force[:-1])
+    # The state that follows the force F₀ + s t without vibration.
+    rate = jnp.diff(force) / step / gear.stiffness
+    level = (force[:-1] - gear.damping * rate) / gear.stiffness
     kept = applied(matrix, (level, rate))
     return matrix, (level + rate * step - kept[0], rate - kept[1])
 

@@ -40,8 +40,6 @@ def ring_profile(
     modulus: Scalar,
     deformation: Scalar,
     angle: Float[Array, " n"],
-    *,
-    terms: int | None = None,
 ) -> Profile:
     """Compute shape, moment and stress of a ring deformed by two opposed loads.
 
@@ -58,10 +56,9 @@ def ring_profile(
         modulus: Young's modulus E [MPa].
         deformation: radial displacement ω under each load [mm].
         angle: φ from one of the loads [rad], shape (n,).
-        terms: of the series; None sums it in closed form.
 
     Returns:
-        The profile, differentiable in every argument but `terms`.
+        The profile, differentiable in every argument.
 
     Source:
         Series: the article's displacement series with the coefficients of least
@@ -70,7 +67,7 @@ def ring_profile(
         Materials).
     """
     angle = jnp.asarray(angle, dtype=float)
-    shape, slip, bend = _closed(angle) if terms is None else _series(angle, terms)
+    shape, slip, bend = _sums(angle)
     scale = deformation / RING_SERIES
     curvature = scale * bend / geometry.radius**2
     inertia = geometry.length * geometry.wall_thickness**3 / 12.0
@@ -84,20 +81,11 @@ def ring_profile(
     )
 
 
-def _series(angle, terms: int):
-    """Return Σ cos nφ/(n²−1)², −Σ sin nφ/(n (n²−1)²) and Σ cos nφ/(n²−1)."""
-    n = 2.0 * jnp.arange(1, terms + 1)
-    weight = n**2 - 1.0
-    cosine, sine = jnp.cos(angle[:, None] * n), jnp.sin(angle[:, None] * n)
-    return (
-        jnp.sum(cosine / weight**2, axis=1),
-        -jnp.sum(sine / (n * weight**2), axis=1),
-        jnp.sum(cosine / weight, axis=1),
-    )
+def _sums(angle):
+    """Return Σ cos nφ/(n²−1)², −Σ sin nφ/(n (n²−1)²) and Σ cos nφ/(n²−1).
 
-
-def _closed(angle):
-    """Return the three sums to infinity; they repeat after half a turn."""
+    Over n = 2, 4, …, to infinity; they repeat after half a turn.
+    """
     x = jnp.mod(angle, jnp.pi)
     sine, cosine, left = jnp.sin(x), jnp.cos(x), 0.5 * jnp.pi - x
     eighth = jnp.pi / 8.0

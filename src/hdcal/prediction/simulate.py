@@ -132,7 +132,7 @@ def gear_forces(
 def gear_leftover(
     model: Model, deformation: np.ndarray, *, seed: int = 0
 ) -> np.ndarray:
-    """Return what a gear by itself has beside model and effects [N], (draw, row).
+    """Return the force of a gear outside model and effects [N], (draw, row).
 
     The bend, and the fitted leftover as the mean of loading and unloading.
 

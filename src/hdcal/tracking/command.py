@@ -35,11 +35,11 @@ def track(console: Console, known, **settings):
     or the first line is a header row such as deformation_mm,force_N, and the others are
     CSV. Each reading is answered at once by a line on standard output.
     """
-    from hdcal.cli.sources import load_usable
+    from hdcal.inference.model_average import load_models
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
-    tracker, bad = Tracker(load_usable(known), **settings), 0
+    tracker, bad = Tracker(load_models(known), **settings), 0
     (mean, half), rate = tracker.stiffness, settings["alarm_rows"]
     words = (
         f"starts at {mean:.4g} ± {half:.2g} {tracker.units.stiffness_unit} (95 %) on a "
@@ -59,4 +59,7 @@ def track(console: Console, known, **settings):
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
         f"{due:.2g} false ones are due without a change"
     )
+    if tracker.alarms and not settings["reopen"]:
+        words = "without --reopen the answers remain those of the gear before a change"
+        console.words(f"{words}, which raises more alarms; --reopen 0.1 learns it")
     return 2 if bad else 0

@@ -80,7 +80,7 @@ def _listed(
     return ListedEffect(
         name=name,
         stage=effect.stage,
-        family=effect.groups[0],
+        family=effect.family,
         needs=tuple(sorted(effect.needs)),
         meaning=(effect.__doc__ or "").strip().split("\n")[0],
         parameters=tuple(found),

@@ -9,9 +9,7 @@ from hdcal.physics.theory import Scalar
 _NEGLIGIBLE = 1e-6
 
 
-class SeatingSlack(
-    Effect, stage="deformation", groups=("curve up",), instantaneous=True
-):
+class SeatingSlack(Effect, stage="deformation", family="curve up", instantaneous=True):
     """Dead zone of the deformation, ω → ω − ω_c clip(ω/ω_c, −1, 1), smoothed.
 
     Play is taken up before the gear carries load. For ω > 0 this is max(0, ω − ω_c).
@@ -35,7 +33,7 @@ _CORNER = 1e-4
 
 
 class ContactBedding(
-    Effect, stage="deformation", groups=("curve up",), instantaneous=True
+    Effect, stage="deformation", family="curve up", instantaneous=True
 ):
     """ω = ω_g + δ(k ω_g), δ(F) = c F/(F + P): half closed at F = P.
 
@@ -65,7 +63,7 @@ class ContactBedding(
 _ROUNDED, _LEAST = 0.02, 1e-4
 
 
-class ContactOnset(Effect, stage="force", groups=("curve up",), instantaneous=True):
+class ContactOnset(Effect, stage="force", family="curve up", instantaneous=True):
     """F → F + k₂ max(0, |ω| − ω_c) sign ω, k₂ = r k, with a rounded corner.
 
     A second contact closes at some deformation and stiffens the gear.

@@ -4,16 +4,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.physics.effect import Effect, PerRow, Rows, parameter
-from hdcal.physics.history import play, stop_cells
+from hdcal.physics.history import by_label, play, stop_cells
 from hdcal.physics.theory import Scalar
 
 
 class PlasticYield(
     Effect,
     stage="force",
-    groups=("loop",),
+    family="loop",
     needs=("unloading",),
-    twin="a joint that sticks before it slips",
 ):
     """F → F − s k ω_p, ω_p the play of ω with half-width ω_y (Prandtl's element).
 
@@ -34,9 +33,7 @@ class PlasticYield(
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
         # Specimen after specimen, each from its first row, whatever the run.
-        order = jnp.argsort(rows.records.specimen, stable=True)
-        specimen = jnp.asarray(rows.records.specimen)[order]
-        starts = jnp.diff(specimen, prepend=specimen[:1] - 1) != 0
+        order, starts = by_label(rows.records.specimen)
         deformation = jnp.asarray(rows.deformation)[order]
         plastic = play(deformation, self.yield_deformation, starts)
         plastic = jnp.zeros_like(signal).at[order].set(plastic)
@@ -46,9 +43,8 @@ class PlasticYield(
 class CoulombFriction(
     Effect,
     stage="force",
-    groups=("loop",),
+    family="loop",
     needs=("unloading",),
-    symmetry="none",
     instantaneous=True,
 ):
     """F → F + F_c s, with s the sign of the last movement; a hold keeps it.
@@ -69,9 +65,8 @@ class CoulombFriction(
 class LoadFriction(
     Effect,
     stage="force",
-    groups=("loop",),
+    family="loop",
     needs=("unloading",),
-    symmetry="none",
     instantaneous=True,
 ):
     """F → F + μ |k ω| s, with s the sign of the last movement; a hold keeps it.
@@ -95,9 +90,7 @@ class LoadFriction(
 _SPREAD = np.array([0.25, 0.5, 0.75, 1.0])
 
 
-class Hysteresis(
-    Effect, stage="force", groups=("loop",), needs=("unloading",), symmetry="none"
-):
+class Hysteresis(Effect, stage="force", family="loop", needs=("unloading",)):
     """Rate-independent loop of stop cells in parallel: F → F + F_h mean(z_j).
 
     Microslip of material and joints that reverses with the movement. A cell sticks and

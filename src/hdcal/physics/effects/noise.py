@@ -6,7 +6,7 @@ from hdcal.physics.effect import Effect, Noise, Rows, parameter
 from hdcal.physics.theory import Scalar
 
 
-class Quantisation(Effect, stage="noise", groups=("noise",), symmetry="even"):
+class Quantisation(Effect, stage="noise", family="noise"):
     """Rounding to a grid of step q seen as noise: sd² → sd² + q²/12.
 
     Readings come in steps of the display.
@@ -21,7 +21,7 @@ class Quantisation(Effect, stage="noise", groups=("noise",), symmetry="even"):
         return Noise(signal.log_weight, sd)
 
 
-class HeteroscedasticNoise(Effect, stage="noise", groups=("noise",), symmetry="even"):
+class HeteroscedasticNoise(Effect, stage="noise", family="noise"):
     """A part of the noise in proportion to the load: sd² → sd² + (s k ω)².
 
     The noise grows with the force.
@@ -44,7 +44,7 @@ class HeteroscedasticNoise(Effect, stage="noise", groups=("noise",), symmetry="e
 _NONE = 1e-150
 
 
-class Outliers(Effect, stage="noise", groups=("noise",), symmetry="even", mixture=True):
+class Outliers(Effect, stage="noise", family="noise", mixture=True):
     """Contaminated normal: with probability π the noise sd is c times larger.
 
     A few readings have a much larger error.

@@ -55,9 +55,8 @@ class Scatter(Effect):
 class RunOffset(
     Scatter,
     stage="sensor",
-    groups=("mounting or gear",),
+    family="mounting or gear",
     needs=("runs",),
-    symmetry="even",
     members="run",
 ):
     """F → F + b_i in run i, with b_i ~ N(0, sd²).
@@ -78,7 +77,7 @@ class RunOffset(
 class SpecimenVariation(
     Scatter,
     stage="force",
-    groups=("mounting or gear",),
+    family="mounting or gear",
     needs=("specimens",),
     members="specimen",
 ):

@@ -9,7 +9,7 @@ from hdcal.physics.theory import Scalar
 class RigCompliance(
     Effect,
     stage="deformation",
-    groups=("rig",),
+    family="rig",
     needs=("bare_rig",),
     instantaneous=True,
 ):
@@ -29,9 +29,7 @@ class RigCompliance(
         return signal / (1.0 + self.compliance * rows.stiffness)
 
 
-class DisplacementNonlinearity(
-    Effect, stage="deformation", groups=("curve up", "curve down"), symmetry="even"
-):
+class DisplacementNonlinearity(Effect, stage="deformation", family="curve up"):
     """ω → ω + e₁ ω².
 
     The characteristic of the displacement gauge is slightly curved. The parabola
@@ -48,9 +46,7 @@ class DisplacementNonlinearity(
         return signal * (1.0 + self.curvature * signal)
 
 
-class ScrewError(
-    Effect, stage="deformation", groups=("screw",), symmetry="none", period="pitch"
-):
+class ScrewError(Effect, stage="deformation", family="screw", period="pitch"):
     """ω → ω + A sin(2π ω/p + φ), written as a sin(2π ω/p) + b cos(2π ω/p).
 
     The thread of a measuring or lead screw wobbles once per turn; its phase does not
@@ -77,7 +73,7 @@ class ScrewError(
 _SMALL = 1e-3
 
 
-class ForceSaturation(Effect, stage="sensor", groups=("curve down",)):
+class ForceSaturation(Effect, stage="sensor", family="curve down"):
     """F → F_s tanh(F/F_s) = F (1 − h F² + …), written in h = 1/(3 F_s²).
 
     A force sensor reads less and less of a large force. The loss of reading is h F² to

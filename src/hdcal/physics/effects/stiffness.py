@@ -11,7 +11,7 @@ _CORNER = 1e-4
 
 
 class ProgressiveStiffening(
-    Effect, stage="force", groups=("curve up",), instantaneous=True
+    Effect, stage="force", family="curve up", instantaneous=True
 ):
     """F → F + k ω · a |ω|: tangent stiffness k (1 + 2 a |ω|).
 
@@ -33,9 +33,7 @@ class ProgressiveStiffening(
 _FIRST, _SECOND = -1.543, 3.35
 
 
-class LargeDeflection(
-    Effect, stage="force", groups=("curve down",), symmetry="none", instantaneous=True
-):
+class LargeDeflection(Effect, stage="force", family="curve down", instantaneous=True):
     """F → F + k ω (−1.543 κω + 3.35 (κω)²), κ = 1/R of the gear; κ = 0: straight.
 
     Compression (ω > 0) softens, tension stiffens: the loads' lever arm is half the
@@ -61,7 +59,7 @@ def _share(meaning: str, typical: float) -> Scalar:
     return parameter("1", meaning, typical=typical, null=0.0)
 
 
-class Ovality(Effect, stage="force", groups=("angle",), needs=("angle",)):
+class Ovality(Effect, stage="force", family="angle", needs=("angle",)):
     """F → F + k ω (c₁ cos θ + s₁ sin θ + c₂ cos 2θ + s₂ sin 2θ).
 
     The gear is stiffer on one diameter than on another: runout and ovality. The same as
@@ -83,7 +81,7 @@ class Ovality(Effect, stage="force", groups=("angle",), needs=("angle",)):
 
 
 class StiffnessFatigue(
-    Effect, stage="force", groups=("mounting or gear",), needs=("cycles",)
+    Effect, stage="force", family="mounting or gear", needs=("cycles",)
 ):
     """F → F − k ω b log₁₀ N, with N the load cycle of the specimen, from 1.
 

@@ -7,9 +7,8 @@ from hdcal.physics.theory import Scalar
 class ThermalExpansion(
     Effect,
     stage="deformation",
-    groups=("zero over temperature",),
+    family="zero over temperature",
     needs=("temperature",),
-    symmetry="even",
 ):
     """ω → ω + a (T − T_ref), radial.
 
@@ -29,7 +28,7 @@ class ThermalExpansion(
 class ThermalStiffness(
     Effect,
     stage="force",
-    groups=("slope over temperature",),
+    family="slope over temperature",
     needs=("temperature",),
     instantaneous=True,
 ):
@@ -53,9 +52,8 @@ class ThermalStiffness(
 class ThermalZeroDrift(
     Effect,
     stage="sensor",
-    groups=("zero over temperature",),
+    family="zero over temperature",
     needs=("temperature",),
-    symmetry="even",
 ):
     """F → F + z (T − T_ref).
 

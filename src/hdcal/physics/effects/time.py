@@ -8,9 +8,8 @@ from hdcal.physics.theory import Scalar
 class ViscousDamping(
     Effect,
     stage="force",
-    groups=("rate or time",),
+    family="rate or time",
     needs=("rates",),
-    symmetry="none",
     instantaneous=True,
 ):
     """F → F + c dω/dt, with the rate as read.
@@ -29,7 +28,7 @@ class ViscousDamping(
 
 
 class Relaxation(
-    Effect, stage="force", groups=("rate or time",), needs=("time", "holds or rates")
+    Effect, stage="force", family="rate or time", needs=("time", "holds or rates")
 ):
     """One Prony arm: F → F − s ∫ (1 − e^(−(t−t')/τ)) d(k ω)(t').
 
@@ -53,7 +52,7 @@ class Relaxation(
         return signal - self.share * (load - left)
 
 
-class ChargeLeakage(Effect, stage="sensor", groups=("rate or time",), needs=("time",)):
+class ChargeLeakage(Effect, stage="sensor", family="rate or time", needs=("time",)):
     """dF_m = dF − λ F_m dt, reset at the start of each run; λ = 1/τ.
 
     Charge leaks from the amplifier of a piezoelectric sensor: readings decay to zero.
@@ -73,9 +72,7 @@ class ChargeLeakage(Effect, stage="sensor", groups=("rate or time",), needs=("ti
         return fading(signal, records.time, records.run, self.rate)
 
 
-class AmplifierDrift(
-    Effect, stage="sensor", groups=("rate or time",), needs=("time",), symmetry="even"
-):
+class AmplifierDrift(Effect, stage="sensor", family="rate or time", needs=("time",)):
     """F → F + r t, with t since the reset of the run; either sign.
 
     The zero of the amplifier drifts after its reset.

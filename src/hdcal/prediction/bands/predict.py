@@ -21,6 +21,7 @@ from hdcal.prediction.conditions import (
     SENSE,
     Conditions,
     Direction,
+    beyond_tested,
     excluded_findings,
     far_findings,
     is_tested,
@@ -122,6 +123,7 @@ def predict(
         weight_left_out=left_out_of(models),
         averaging=tuple(averaging_words(models)),
         tested_range=_range_words(case),
+        beyond_tested=max(beyond_tested(float(x), case.records) for x in along),
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
     )

@@ -33,6 +33,8 @@ class Bands(Result):
         weight_left_out: probability of hypotheses that were not calibrated.
         averaging: sentences on these.
         tested_range: deformations, temperatures and directions of the data, in words.
+        beyond_tested: largest distance from the tested deformations, as a share of
+            their range.
     """
 
     template = "prediction/bands/report.md.j2"
@@ -59,6 +61,7 @@ class Bands(Result):
     weight_left_out: Probability
     averaging: tuple[str, ...] = Field(exclude=True)
     tested_range: str = Field(exclude=True)
+    beyond_tested: float = Field(exclude=True)
 
     @computed_field(
         alias="columns", json_schema_extra={"additionalProperties": {"type": "array"}}

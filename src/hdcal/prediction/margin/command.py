@@ -8,6 +8,7 @@ from hdcal.cli import options
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH, WINDOW, unit_findings
+from hdcal.errors import Finding
 
 
 @command(
@@ -18,7 +19,16 @@ from hdcal.cli.option_types import FORCE, LENGTH, WINDOW, unit_findings
 @click.option(
     "--deformation", type=LENGTH, required=True, help="Deformation as read [mm]."
 )
-@options.decision_options
+@click.option(
+    "--limit-force",
+    type=FORCE,
+    help="Capacity of the actuator [N]: its size, in compression and in tension.",
+)
+@click.option(
+    "--rule",
+    type=click.Choice(["guarded", "simple"]),
+    help="Decision about it, by the expanded uncertainty or not [default: guarded].",
+)
 @click.option(
     "--given-force",
     type=FORCE,
@@ -54,7 +64,11 @@ from hdcal.cli.option_types import FORCE, LENGTH, WINDOW, unit_findings
 @options.seed_option
 @options.folder_options("Write a result folder with a report.")
 @options.json_option
-@options.certificate_option
+@click.option(
+    "--certificate",
+    is_flag=True,
+    help="Also write a certificate to sign, one A4 page.",
+)
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force needed at a deformation, from RUN.
@@ -70,7 +84,9 @@ def margin(console: Console, run, out, force, certificate, **asked):
     with console.wrong as wrong:
         models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
-        wrong += options.needs_folder("certificate", certificate, out)
+        if certificate and out is None:
+            words = "is written into a result folder"
+            wrong.append(Finding("certificate", words, "Give `out` too"))
         if models is not None:
             units = model_pairs(models)[0][1].case.units
             names = "deformation", "limit_force", "given_force"
