@@ -13,7 +13,7 @@ from jaxtyping import Float
 from numpyro.distributions import biject_to
 from numpyro.handlers import substitute, trace
 from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
-from scipy.optimize import OptimizeResult, minimize
+from scipy.optimize import minimize
 
 from hdcal.data.records import Array
 from hdcal.exported import jit
@@ -24,8 +24,6 @@ Position = dict[str, Any]
 # Length of the gradient at which a search ends [nat per posterior sd], the largest
 # radius of its trust region in such units, and the most steps.
 _OPTIONS = {"gtol": 1e-6, "max_trust_radius": 1e4, "maxiter": 300}
-# A search among kinks of the density ends when so many steps gained less [nat].
-_STEPS, _LEAST_GAIN = 12, 1e-3
 
 
 class Whitening(eqx.Module):
@@ -96,7 +94,6 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
         jac=True,
         hess=lambda u: expand(*u)[2],
         method="trust-exact",
-        callback=_stop_at_kink() if problem.non_smooth else None,
         options=_OPTIONS,
     )
     # A root of the inverse of |Hessian|, its eigenvalues floored.
@@ -163,15 +160,3 @@ def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     if not weights:
         return value
     return value - weights * jnp.log(values_at(problem, position)["sigma"])
-
-
-def _stop_at_kink():
-    """Return a callback that ends a search at a kink, where no gradient vanishes."""
-    levels: list[float] = []
-
-    def stop(intermediate_result: OptimizeResult) -> None:
-        levels.append(float(intermediate_result.fun))
-        if len(levels) > _STEPS and levels[-1 - _STEPS] - levels[-1] < _LEAST_GAIN:
-            raise StopIteration
-
-    return stop

@@ -98,8 +98,7 @@ def sample(
         progress: called after every stretch.
     """
     begin = partial(_Run, problem, whitening, seed, chains, warmup, progress)
-    # At kinks of the density long steps diverge: they are not tried.
-    *longer, shortest = TARGET_ACCEPTANCE[problem.non_smooth :]
+    *longer, shortest = TARGET_ACCEPTANCE
     for target in longer:
         run = begin(target)
         run.advance(draws, stop_if_diverging=True)

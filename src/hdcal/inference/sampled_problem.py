@@ -21,11 +21,6 @@ class Sampled(eqx.Module):
         priors: dict[str, Prior]
 
     @property
-    def non_smooth(self) -> bool:
-        """Whether its density has bends, at which the gradient jumps."""
-        return False
-
-    @property
     def sampled_weights(self) -> int:
         """Number of weights of a discrepancy that is not integrated out."""
         return 0
