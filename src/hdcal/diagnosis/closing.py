@@ -7,16 +7,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from hdcal.evidence.components import Components, components
+from hdcal.evidence.evaluation import select
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import LinearPosterior, Part, join, posterior
-from hdcal.evidence.row_features import half_cycle_blocks, place_in_run
+from hdcal.evidence.row_features import half_cycles, place_in_run
 from hdcal.evidence.search import Searched
-from hdcal.evidence.selection import select
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.report.item import Interval
 
 _SAMPLES = 1000
+# With fewer half cycles all rows are cut into stretches.
+_FEWEST_HALVES = 4
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,12 @@ def _blocks(
         quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
         return quarter.astype(int), "a quarter of each run"
     word = "a half cycle" if "unloading" in records.known else "a stretch of rows"
-    return half_cycle_blocks(records), word
+    halves = half_cycles(records)
+    if halves[-1] + 1 >= _FEWEST_HALVES:
+        return halves, word
+    rows = len(halves)
+    count = int(np.clip(rows // 3, 2, 6))
+    return np.minimum(np.arange(rows) * count // rows, count - 1), word
 
 
 def _without(

@@ -15,8 +15,7 @@ from jaxtyping import Float
 
 from hdcal.data.records import Records
 from hdcal.diagnosis.candidate_runs import ROWS, candidate_runs
-from hdcal.evidence.components import atom_on_runs, space_on_runs
-from hdcal.evidence.linear_problem import base_columns
+from hdcal.evidence.base_model import base_columns
 from hdcal.evidence.parts import Part, coefficients, posterior
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
@@ -160,19 +159,14 @@ def _on_runs(
     searched: Searched, part: Part, after: Records
 ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, "r j m"]]:
     """Return offset and columns of a part on each run, history included."""
-    selection, problem = searched.selection, searched.problem
+    selection, component = searched.selection, part.component
     assert part.place is not None
-    effect = searched.predicting.effects[selection.names[part.component]]
-    if np.any(selection.atoms.owner == part.component):
-        atom = selection.atoms.pick(np.array([part.place.row]))
-        offset, slope = atom_on_runs(effect, problem, atom, after)
-        return offset[:, -ROWS:], slope[:, None, -ROWS:]
-    count, nothing = len(after.force), np.zeros((len(after.force), ROWS))
-    shape = selection.spaces[part.place.row].shape
-    if shape < 0:
-        # Members of a new run or gear are new: nothing is known of them.
-        return nothing, np.zeros((count, len(part.columns), ROWS))
-    return nothing, space_on_runs(effect, problem, shape, after)[..., -ROWS:]
+    if np.any(selection.atoms.owner == component):
+        item = selection.atoms.pick(np.array([part.place.row]))
+    else:
+        item = selection.spaces[part.place.row]
+    found = searched.components.on_runs(searched.problem, component, item, after)
+    return found[0][:, -ROWS:], found[1][..., -ROWS:]
 
 
 def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -> float:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.evidence.fewer_rows import thin_rows
+from hdcal.evidence.row_features import thin_rows
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior

@@ -25,7 +25,7 @@ class Context(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where an item stands in the tables of a selection: row and column."""
+    """Row and column of an item in the tables of a selection."""
 
     row: int
     column: int

@@ -2,22 +2,21 @@
 
 Everything is evaluated alone under every model of the noise. Then the most probable
 components become contexts, one after the other, beside which everything is evaluated
-again, and the best pairs are refined and looked at beside a remainder.
+again; the best pairs are refined, and evaluated with a remainder.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.evidence.coarse_reading import coarse_step, with_coarse_step
-from hdcal.evidence.components import Space, components
-from hdcal.evidence.covariates import Predicting, half_cycle_rows, predicting
-from hdcal.evidence.evaluation import Evaluated, Selection
-from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
-from hdcal.evidence.linear_problem import Expansion, LinearProblem, linear_problem
-from hdcal.evidence.local_structure import likeliest_members, local_families
+from hdcal.evidence.components import Components, Predicting, components, predicting
+from hdcal.evidence.evaluation import Evaluated, Selection, select
+from hdcal.evidence.items import Space
+from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import (
     GROWING,
     OUTLIERS,
@@ -27,24 +26,18 @@ from hdcal.evidence.noise_models import (
     growing_noise,
     outliers,
 )
-from hdcal.evidence.parts import (
-    Part,
-    join,
-    log_sign_probability,
-    merged,
-    posterior,
-)
-from hdcal.evidence.remainder import kernels
-from hdcal.evidence.selection import select
+from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
+from hdcal.evidence.remainder import kernels, likeliest_members, local_families
+from hdcal.evidence.row_features import average_rows, half_cycle_rows, thin_rows
 from hdcal.evidence.table import OUTSIDE, EvidenceTable, Names
 from hdcal.physics.effect import Effect
 
-# Components beside which others are looked for; models of the noise used there, and
+# Components beside which others are evaluated; models of the noise used there, and
 # their least probability.
 _CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
 # Log evidence below the best beside a context from which on a hypothesis is left out.
 _HOPELESS = 25.0
-# Pairs that are refined, times, and looked at beside a remainder.
+# Pairs that are refined, times, and evaluated with a remainder.
 _REFINED, _TIMES = 3, 2
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
@@ -66,8 +59,9 @@ class Searched:
     Attributes:
         problem: the linear problem.
         table: evidence of each hypothesis.
-        predicting: effects of the library by what the rows tell about them.
-        selection: the components that were compared.
+        predicting: effects of the library by whether they predict something.
+        components: of these effects.
+        selection: the items that were compared.
         kernels: columns of each kernel of the remainder [N], shape (j, n).
         coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
     """
@@ -75,6 +69,7 @@ class Searched:
     problem: LinearProblem
     table: EvidenceTable
     predicting: Predicting
+    components: Components
     selection: Selection
     kernels: list[np.ndarray]
     coarse_step: float
@@ -93,17 +88,15 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case = average_rows(with_coarse_step(case), MOST_ROWS)
+    case = average_rows(with_coarse_step(case))
     problem = linear_problem(case, library, free_runs=free_runs)
     found = _Search(problem, library)
-    found.alone(range(len(problem.correlations)))
     if _oversampled(problem, found.table):
         return search(thin_rows(case, _STEP), library, free_runs=free_runs)
     about = _expansion(problem, found.table)
     if about is not None:
-        problem = linear_problem(case, library, about, free_runs=free_runs)
+        problem = linear_problem(case, library, free_runs=free_runs, **about)
         found = _Search(problem, library, found.kernels)
-        found.alone(range(len(problem.correlations)))
     found.fitted_correlations()
     step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
@@ -114,6 +107,7 @@ def search(
         problem=problem,
         table=found.table,
         predicting=found.predicting,
+        components=found.components,
         selection=found.selection,
         kernels=[space.columns for space in found.kernels],
         coarse_step=step,
@@ -121,15 +115,15 @@ def search(
 
 
 def _oversampled(problem: LinearProblem, table: EvidenceTable) -> bool:
-    """Return whether noise is correlated as far as the grid reaches, in many rows."""
-    if int(np.argmax(table.noise_probabilities())) < len(problem.correlations) - 1:
+    """Whether noise is correlated as far as the grid reaches, in many rows."""
+    if int(np.argmax(table.noise_probabilities())) < len(table.noises) - 1:
         return False
     enough = len(problem.y) >= _STEP * _FEWEST
     return enough and half_cycle_rows(problem.records) >= _STEP * _FEWEST_OF_HALF
 
 
-def _expansion(problem: LinearProblem, table: EvidenceTable) -> Expansion | None:
-    """Return the point of expansion beside the best hypothesis, where it differs."""
+def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
+    """Return noise sd and stiffness beside the best hypothesis, where they differ."""
     parts = table.parts[table.ranked()[0]]
     found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
     # The first coefficient is the deviation of the log stiffness from its prior mean.
@@ -144,11 +138,16 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> Expansion | None
     louder = abs(np.log(noise_sd / problem.noise_sd)) > _SAME_NOISE
     if deviation <= -1.0 or not (moved or louder):
         return None
-    return Expansion(noise_sd, float(problem.base.stiffness) * (1.0 + deviation))
+    stiffness = float(problem.base.stiffness) * (1.0 + deviation)
+    return {"noise_sd": noise_sd, "stiffness": stiffness}
+
+
+def _likeliest(found: Evaluated, component: int) -> list[Part]:
+    return [found.likeliest(component)]
 
 
 class _Search:
-    """Fills the table of one linear problem."""
+    """Fills the table of one linear problem; everything alone is entered at once."""
 
     def __init__(
         self,
@@ -157,25 +156,19 @@ class _Search:
         known_kernels: list[Space] | None = None,
     ):
         self.problem, self.predicting = problem, predicting(library, problem.records)
-        effects = components(self.predicting.effects, problem)
+        self.components = effects = components(self.predicting.effects, problem)
         self.outside = len(effects.names)
         self.families = local_families(problem)
-        self.kernels = (
-            kernels(problem, effects, self.outside)
-            if known_kernels is None
-            else known_kernels
-        )
+        if known_kernels is None:
+            known_kernels = kernels(problem, effects, self.outside)
+        self.kernels = known_kernels
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
         self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
-        self.selection = select(
-            problem,
-            self.table.noises,
-            effects,
-            self._sharing(self.kernels),
-            self.table.names,
-        )
+        spaces, names = self._sharing(self.kernels), self.table.names
+        self.selection = select(problem, self.table.noises, effects, spaces, names)
         self.found_alone: dict[int, Evaluated] = {}
+        self._alone(range(len(self.table.noises)))
 
     def _sharing(self, spaces: Sequence[Space]) -> list[Space]:
         """Return spaces of the remainder, among which its prior is shared."""
@@ -184,7 +177,7 @@ class _Search:
             for space in spaces
         ]
 
-    def evaluate(
+    def _evaluate(
         self,
         columns: Sequence[int],
         parts: Sequence[Part],
@@ -201,20 +194,17 @@ class _Search:
             column: evaluate(noises[column], context, local, only) for column in columns
         }
 
-    def alone(self, columns: Sequence[int]) -> None:
+    def _alone(self, columns: Sequence[int]) -> None:
         """Enter none and each component alone."""
         table = self.table
-        for column, found in self.evaluate(columns, []).items():
+        for column, found in self._evaluate(columns, []).items():
             self.found_alone[column] = found
             table.put((), column, found.none, list)
             for k, value in enumerate(found.totals()):
                 if np.isfinite(value):
-                    table.put(
-                        (table.names[k],),
-                        column,
-                        float(value),
-                        lambda k=k, found=found: [found.likeliest(k)],
-                    )
+                    name = (table.names[k],)
+                    parts = partial(_likeliest, found, k)
+                    table.put(name, column, value, parts)
 
     def fitted_correlations(self) -> None:
         """Enter everything alone with the correlations that two hypotheses leave.
@@ -222,13 +212,14 @@ class _Search:
         In many rows a correlation between two of the grid fits much better than both.
         """
         table, problem = self.table, self.problem
+        largest = table.noises[-1].correlation
         for key in dict.fromkeys([(), table.ranked()[0]]):
             fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            more = correlated_noise(problem, problem.y - fit.reading)
+            more = correlated_noise(problem, problem.y - fit.reading, largest)
             known = np.array([noise.correlation for noise in table.noises])
             if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
                 table.add_noises([more])
-                self.alone([len(table.noises) - 1])
+                self._alone([len(table.noises) - 1])
 
     def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
         """Enter everything alone under the library's models of the noise."""
@@ -247,17 +238,13 @@ class _Search:
                 more += outliers(problem, correlation, fitted)
         count = len(table.noises)
         table.add_noises(more)
-        self.alone(range(count, len(table.noises)))
+        self._alone(range(count, len(table.noises)))
 
     def pairs(self) -> None:
-        """Enter pairs, and components and pairs beside a remainder."""
-        table = self.table
-        chance = table.noise_probabilities()
-        columns = [
-            int(column)
-            for column in np.argsort(-chance)[:_MOST_NOISES]
-            if chance[column] >= _LEAST_NOISE
-        ]
+        """Enter pairs, and components and pairs with a remainder."""
+        table, chance = self.table, self.table.noise_probabilities()
+        columns = np.argsort(-chance)[:_MOST_NOISES]
+        columns = [int(k) for k in columns if chance[k] >= _LEAST_NOISE]
         leading = table.ranked(1)[:_CONTEXTS]
         if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
             leading[-1] = (OUTSIDE,)
@@ -276,27 +263,22 @@ class _Search:
             self._grow(key, columns[:1])
 
     def _grow(self, key: Names, columns: Sequence[int]) -> None:
-        """Add kernels to the remainder of a hypothesis while the readings ask for more.
+        """Add kernels to the remainder of a hypothesis while the evidence grows.
 
         Args:
             key: the hypothesis.
             columns: indices of the models of the noise.
         """
-        table = self.table
+        table, outside = self.table, self.outside
         for _ in range(_MOST_KERNELS - 1):
             parts, before = table.parts[key], table.log_evidence[key].max()
-            others = [part for part in parts if part.component != self.outside]
-            own = [part for part in parts if part.component == self.outside]
-            for column, found in self.evaluate(columns, parts, {self.outside}).items():
-                gain = found.totals()[self.outside] - found.none + np.log(_ONE_MORE)
-                more = [*others, merged([*own, found.likeliest(self.outside)])]
-                noise = table.noises[column]
-                before_signs, signs = (
-                    log_sign_probability(self.problem, noise, each)
-                    for each in (parts, more)
-                )
-                gain += min(signs - before_signs, 0.0)
-                value = float(table.log_evidence[key][column] + gain)
+            others = [part for part in parts if part.component != outside]
+            own = [part for part in parts if part.component == outside]
+            for column, found in self._evaluate(columns, parts, {outside}).items():
+                more = [*others, merged([*own, found.likeliest(outside)])]
+                gain = found.totals()[outside] - found.none + np.log(_ONE_MORE)
+                gain += self._signs(column, parts, more)
+                value = table.log_evidence[key][column] + gain
                 table.put(key, column, value, lambda more=more: more)
             if table.log_evidence[key].max() <= before:
                 return
@@ -318,22 +300,26 @@ class _Search:
             columns: indices of the models of the noise.
             only: the components to enter; by default all.
         """
-        table, problem = self.table, self.problem
+        table = self.table
         key = tuple(sorted(table.names[part.component] for part in parts))
-        for column, found in self.evaluate(columns, parts, only).items():
-            noise = table.noises[column]
-            signs = log_sign_probability(problem, noise, parts)
+        for column, found in self._evaluate(columns, parts, only).items():
             gain = found.totals() - found.none
             start = table.log_evidence[key][column]
             if len(parts) == 1 and parts[0].place is not None:
                 start = self.found_alone[column].of_part(parts[0])
-            gain[[table.names.index(name) for name in key]] = -np.inf
+            gain[[part.component for part in parts]] = -np.inf
             for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
-                names = (*key, table.names[k])
-                many = len(names) - (OUTSIDE in names) > 2
-                if many:
+                names = {*key, table.names[k]}
+                if len(names - {OUTSIDE}) > 2:
                     continue
                 both = [*parts, found.likeliest(int(k))]
-                change = log_sign_probability(problem, noise, both) - signs
-                value = float(start + gain[k] + min(change, 0.0))
-                table.put(names, column, value, lambda both=both: both)
+                value = start + gain[k] + self._signs(column, parts, both)
+                table.put(tuple(names), column, value, lambda both=both: both)
+
+    def _signs(self, column: int, parts: list[Part], more: list[Part]) -> float:
+        """Return the change of the log probability of signs, which is no gain."""
+        before, after = (
+            log_sign_probability(self.problem, self.table.noises[column], each)
+            for each in (parts, more)
+        )
+        return min(after - before, 0.0)

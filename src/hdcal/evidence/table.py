@@ -93,7 +93,7 @@ class EvidenceTable:
         row = self.log_evidence.setdefault(key, none)
         if value > row.max():
             self.parts[key] = parts()
-        row[column] = max(row[column], value)
+        row[column] = max(row[column], float(value))
 
     def add_noises(self, noises: list[NoiseModel]) -> None:
         """Add models of the noise, under which nothing is evaluated yet."""

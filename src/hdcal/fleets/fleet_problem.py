@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step
-from hdcal.evidence.linear_problem import moments, stiffness_prior
+from hdcal.evidence.base_model import moments, stiffness_prior
 from hdcal.fleets.change_points import middle_sd
 from hdcal.fleets.gear_sums import GearSums, MountingSums, gear_sums, stretched
 from hdcal.fleets.groupings import Grouping
