@@ -1,7 +1,6 @@
 """`hdcal diagnose` answers for one case or many, and writes all of it or nothing."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -118,15 +117,14 @@ def test_bad_input_is_refused_at_once_and_nothing_is_written(
 def test_a_defect_in_one_case_does_not_stop_the_others(
     diagnose, cases, monkeypatch, tmp_path: Path
 ):
-    right = many_cases._write
+    right = many_cases.diagnose_into
 
-    def half(found, folder, command, *, report):
-        if found.data.name == "two":
-            (folder / "where.svg").touch()
+    def broken(folder, case, **how):
+        if case.name == "two":
             raise ValueError("broken")
-        right(found, folder, command, report=report)
+        return right(folder, case, **how)
 
-    monkeypatch.setattr(many_cases, "_write", half)
+    monkeypatch.setattr(many_cases, "diagnose_into", broken)
     done = diagnose(cases["one"], cases["two"], "--no-report", "--out", "all")
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert names(tmp_path / "all") == {"one", REFUSED, MARKER}
@@ -143,19 +141,10 @@ def test_an_interruption_leaves_nothing(diagnose, cases, monkeypatch, tmp_path: 
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(many_cases, "_write", interrupted)
+    monkeypatch.setattr(many_cases, "diagnose_into", interrupted)
     for asked in ([cases["one"]], [cases["one"], cases["two"]]):
         assert diagnose(*asked).returncode == 130
     assert names(tmp_path) == {"cases"}
-
-
-def test_with_many_cases_reports_have_to_be_asked_for(
-    diagnose, cases, monkeypatch, tmp_path: Path
-):
-    monkeypatch.setattr(sys.modules["hdcal.diagnosis.command"], "MANY", 1)
-    done = diagnose(cases["one"], cases["two"])
-    assert done.returncode == 0 and "--report" in done.stderr
-    assert names(tmp_path / "diagnosis" / "two") == {"verdict.json"}
 
 
 def test_any_number_of_processes_writes_the_same(diagnose, cases, tmp_path: Path):

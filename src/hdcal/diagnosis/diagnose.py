@@ -20,6 +20,7 @@ from hdcal.diagnosis.decision import (
 from hdcal.diagnosis.gap import Fitted, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
+from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.refit import Refits, failures, refit, rows_to_calibrate
 from hdcal.diagnosis.result import (
     Data,
@@ -29,7 +30,6 @@ from hdcal.diagnosis.result import (
     Refit,
     Rung,
 )
-from hdcal.diagnosis.seen import what_is_seen
 from hdcal.diagnosis.which import LIKELY
 from hdcal.diagnosis.wording import effect_words
 from hdcal.errors import Finding, Findings, InputError
@@ -93,7 +93,7 @@ def diagnose(
             share_of_full_scale=size.median / largest if size else None,
             correlation=fit.noise.correlation,
         ),
-        seen=what_is_seen(searched.problem, case),
+        seen=find_patterns(searched.problem, case),
         which=found.which,
         how_far=_how_far(case, searched, fit, names, rng),
         next_test=tuple(

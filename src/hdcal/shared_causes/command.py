@@ -43,13 +43,12 @@ def causes(
     from hdcal.data.measurements.gear_files import gear_files
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
-    from hdcal.physics.registry import EFFECTS
     from hdcal.shared_causes.gears import read_gears, usable_gears
 
     with console.wrong as wrong:
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
-        effects = wrong.attempt(choose_library, library, EFFECTS)
+        effects = wrong.attempt(choose_library, library)
         if gear_files(given["data"]):
             wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
             del given["sheet"], given["specimen"]
