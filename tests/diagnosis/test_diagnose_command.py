@@ -147,6 +147,7 @@ def test_an_interruption_leaves_nothing(diagnose, cases, monkeypatch, tmp_path: 
     assert names(tmp_path) == {"cases"}
 
 
+@pytest.mark.thorough
 def test_any_number_of_processes_writes_the_same(diagnose, cases, tmp_path: Path):
     for jobs in ("1", "2"):
         given = "--jobs", jobs, "--no-report", "--out", jobs

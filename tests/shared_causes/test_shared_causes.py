@@ -69,6 +69,7 @@ def test_the_gears_with_an_effect_are_named(with_loop):
     assert all("none" in named[gear] for gear in GEARS if gear not in WITH_LOOP)
     friction = shared(with_loop, "coulomb_friction")
     assert friction.gears_named == 4
+    # Without the division of log odds by 1.6 the interval would end at 0.94.
     assert 0.15 < friction.share.lo < 4 / 7 < friction.share.hi < 0.99
     # Other gears make the cause of a gear more probable.
     for each in with_loop.each_gear[:4]:

@@ -1,7 +1,7 @@
-"""What acts in the draws of each hypothesis, and which share of the gap it closes.
+"""Components that act in draws of each hypothesis, and their shares of the gap.
 
-The gap is what the acting components leave beside the base model. A component acts in a
-draw where the rows show it: a coefficient that happens to be tiny is none.
+The gap is the sum of the acting components, with the base model projected out. A
+component acts in a draw where the rows show it: a tiny coefficient does not act.
 """
 
 from collections import defaultdict
@@ -18,7 +18,7 @@ from hdcal.evidence.table import OUTSIDE, Names
 
 # A component acts from this squared visible length on, in noise variances.
 _SHOWN = 6.0
-# Hypotheses of less probability are not drawn from: all that they contain acts.
+# No draws are made of less probable hypotheses: all that they contain acts.
 NEGLIGIBLE, DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
 CARRIED = 0.5
@@ -26,7 +26,7 @@ CARRIED = 0.5
 
 @dataclass(frozen=True)
 class Acting:
-    """Draws of one hypothesis and noise model that agree in what acts.
+    """Draws of one hypothesis and noise model in which the same components act.
 
     Attributes:
         weight: their probability.
@@ -66,7 +66,7 @@ def acting(
     class_of: Mapping[str, str],
     rng: np.random.Generator,
 ) -> list[Acting]:
-    """Return what acts in each hypothesis and noise model.
+    """Return the components that act in each hypothesis and noise model.
 
     Args:
         searched: hypotheses of the case.
@@ -85,12 +85,9 @@ def acting(
         whole = [Acting(1.0, key, "", {}, np.ones(1), np.zeros(0))]
         for name, weight in by_noise.items():
             for each in drawn if weight >= NEGLIGIBLE and drawn else whole:
-                found.append(_weighted(each, weight, name))
+                share = each.weight * weight
+                found.append(replace(each, weight=share, noise=name))
     return found
-
-
-def _weighted(each: Acting, weight: float, noise: str) -> Acting:
-    return replace(each, weight=each.weight * weight, noise=noise)
 
 
 def _drawn(
@@ -111,7 +108,7 @@ def _drawn(
     shown = visible > _SHOWN * problem.noise_sd**2
     shown &= np.mean(curves**2, axis=2) > least**2
     gaps = np.einsum("kd,kdn->dn", shown, curves)
-    # What points away from the gap only makes up for another component.
+    # A component that points away from the gap only compensates another one.
     shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)

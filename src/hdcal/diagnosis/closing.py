@@ -1,7 +1,6 @@
 """How far the gap closes on rows that were not fitted to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -10,33 +9,15 @@ from hdcal.evidence.components import Components, components
 from hdcal.evidence.evaluation import select
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import LinearPosterior, Part, join, posterior
+from hdcal.evidence.parts import Part, join, posterior
 from hdcal.evidence.row_features import half_cycles, place_in_run
 from hdcal.evidence.search import Searched
 from hdcal.physics.effects.scatter import Scatter
-from hdcal.report.item import Interval
+from hdcal.report.item import TAILS, Interval
 
 _SAMPLES = 1000
 # With fewer half cycles all rows are cut into stretches.
 _FEWEST_HALVES = 4
-
-
-@dataclass(frozen=True)
-class _LeftOut:
-    """Squared errors on rows that were left out, in noise variances of a row.
-
-    Attributes:
-        rows: their number.
-        before: mean square of the base model's errors, less the noise and less the
-            variance of the prediction.
-        after: the same with the effects.
-        spread: variance of the second prediction.
-    """
-
-    rows: int
-    before: float
-    after: float
-    spread: float
 
 
 def closed_on_left_out(
@@ -46,7 +27,7 @@ def closed_on_left_out(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> tuple[Interval | None, str]:
-    """Return the share of the gap that effects close on rows they never saw.
+    """Return the share of the gap that effects close on rows left out of the fit.
 
     The rows are left out block by block: half cycles, or stretches where there are few.
     Base model and effects are fitted to the others, the shapes of the effects included.
@@ -65,33 +46,30 @@ def closed_on_left_out(
     """
     problem = searched.problem
     effects = {name: searched.predicting.effects[name] for name in names}
-    block, word = _blocks(
-        problem, any(issubclass(e, Scatter) for e in effects.values())
+    members = any(issubclass(effect, Scatter) for effect in effects.values())
+    block, word = _blocks(problem, by_member=members)
+    library, count = components(effects, problem), int(block.max()) + 1
+    table = np.array(
+        [_errors(problem, library, noise, noise_sd, block == k) for k in range(count)]
     )
-    library = components(effects, problem)
-    found = [
-        _without(problem, library, noise, noise_sd, block == index)
-        for index in range(int(block.max()) + 1)
-    ]
-    table = np.array([[one.before, one.after, one.spread] for one in found])
-    rows = np.array([one.rows for one in found], float)
-    picked = rng.multinomial(len(found), np.full(len(found), 1 / len(found)), _SAMPLES)
-    squares = picked * rows @ table / (picked @ rows)[:, None]
-    # The relative error of a noise variance that so many rows tell.
+    rows = np.bincount(block).astype(float)
+    picked = rng.multinomial(count, np.full(count, 1.0 / count), _SAMPLES)
+    before, after, spread = (picked * rows @ table / (picked @ rows)[:, None]).T
+    # The relative error of a noise variance that so many rows determine.
     free = max(problem.count - problem.X.shape[1] - len(names), 1)
     off = free / rng.chisquare(free, _SAMPLES) - 1.0
-    closed = _closed(squares[:, 0] - off, squares[:, 1] - off)
+    closed = _closed(before - off, after - off)
     # With few blocks the variance of the prediction is known roughly only: the lower
     # end does without it.
-    careful = _closed(squares[:, 0] - off, squares[:, 1] + squares[:, 2] - off)
+    careful = _closed(before - off, after + spread - off)
     if np.isfinite(closed).mean() < 0.5:
         return None, word
     whole = rows @ table / rows.sum()
     middle = float(_closed(whole[0], whole[1]))
     middle = float(np.nanmedian(closed)) if np.isnan(middle) else middle
-    low, high = np.nanquantile(careful, 0.025), np.nanquantile(closed, 0.975)
-    ends = {"lo": min(float(low), middle), "hi": max(float(high), middle)}
-    return Interval(median=middle, **ends), word
+    low, high = np.nanquantile(careful, TAILS[0]), np.nanquantile(closed, TAILS[2])
+    low, high = min(float(low), middle), max(float(high), middle)
+    return Interval(median=middle, lo=low, hi=high), word
 
 
 def _closed(before, after):
@@ -101,14 +79,14 @@ def _closed(before, after):
 
 
 def _blocks(
-    problem: LinearProblem, by_member: bool
+    problem: LinearProblem, *, by_member: bool
 ) -> tuple[Int[np.ndarray, " n"], str]:
-    """Return the block of each row, and what a block is called.
+    """Return the block of each row, and the word for a block.
 
     Args:
         problem: the case.
-        by_member: whether members differ. What a whole one is like cannot be told
-            without any row of it, so that a block is a quarter of each.
+        by_member: whether members differ. Nothing predicts a member without any row of
+            it, so that a block is a quarter of each.
     """
     records = problem.records
     if by_member:
@@ -123,33 +101,29 @@ def _blocks(
     return np.minimum(np.arange(rows) * count // rows, count - 1), word
 
 
-def _without(
+def _errors(
     problem: LinearProblem,
     library: Components,
     noise: NoiseModel,
     noise_sd: float,
     left_out: Bool[np.ndarray, " n"],
-) -> _LeftOut:
-    """Return errors on some rows of models that were fitted without them."""
+) -> Float[np.ndarray, " 3"]:
+    """Return mean squared errors on some rows of models that were fitted without them.
+
+    In noise variances of a row: the base model's, less the noise and less the variance
+    of the prediction; the same with the effects; and the variance of that prediction.
+    """
     rest = problem.without(left_out)
-    told = noise._replace(weight=np.where(left_out, 0.0, noise.weight))
-    weight = noise.weight[left_out]
+    others = noise._replace(weight=np.where(left_out, 0.0, noise.weight))
+    weight = noise.weight[left_out] / noise_sd
 
     def error(parts: Sequence[Part]) -> tuple[float, float]:
-        found = posterior(rest, told, parts)
-        off = (problem.y - found.reading)[left_out] * weight / noise_sd
-        spread = _variance(found, left_out) * (weight / noise_sd) ** 2
-        return float(np.mean(off**2 - spread)) - 1.0, float(np.mean(spread))
+        found = posterior(rest, others, parts)
+        off = (problem.y - found.reading)[left_out] * weight
+        sd = np.linalg.norm(found.columns[left_out] @ found.factor.T, axis=1) * weight
+        return float(np.mean(off**2 - sd**2)) - 1.0, float(np.mean(sd**2))
 
-    before, _ = error([])
-    after, spread = error(_fitted(rest, library, told))
-    return _LeftOut(int(left_out.sum()), before, after, spread)
-
-
-def _variance(
-    found: LinearPosterior, rows: Bool[np.ndarray, " n"]
-) -> Float[np.ndarray, " m"]:
-    return np.sum((found.columns[rows] @ found.factor.T) ** 2, axis=1)
+    return np.array([error([])[0], *error(_fitted(rest, library, others))])
 
 
 def _fitted(

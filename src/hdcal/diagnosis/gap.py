@@ -1,4 +1,4 @@
-"""The gap between the base model and the readings, row by row."""
+"""The gap between the base model and the readings, row by row and model by model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from hdcal.data.records import Records
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Part, posterior, sampled_curves
+from hdcal.evidence.parts import posterior, sampled_curves
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
 
@@ -20,7 +20,7 @@ class GapByRow:
     """What the base model leaves of the readings.
 
     Attributes:
-        records: the rows that were looked at, run after run: all, means of neighbours,
+        records: the rows that were diagnosed, run after run: all, means of neighbours,
             or one of several.
         residual: reading less the base model fitted alone [N], shape (n,).
         draws: of the gap, over all hypotheses [N], shape (d, n).
@@ -38,8 +38,8 @@ class Fitted:
     Attributes:
         noise: its model of the noise.
         noise_sd: of a typical row [N].
-        rms: what is left beside the base model, then with each effect besides, then
-            with what is outside the library [N], by what was added last.
+        rms: what the base model leaves, then with each effect in addition, then with a
+            remainder outside the library [N], by what was added last.
     """
 
     noise: NoiseModel
@@ -80,34 +80,29 @@ def fitted(
     posterior_of: Mapping[Names, np.ndarray],
     names: Sequence[str],
 ) -> Fitted:
-    """Return the likeliest of the hypotheses that hold most of some effects.
+    """Return the likeliest of the hypotheses that contain most of some effects.
 
     Args:
         searched: hypotheses of the case.
         posterior_of: probability of each, by model of the noise.
-        names: of the effects on the mean reading; some of a hypothesis.
+        names: of the effects on the mean reading; a hypothesis contains two at most.
     """
     problem, table = searched.problem, searched.table
-    # A hypothesis holds two effects at most, and more may act.
     key = max(
         posterior_of,
         key=lambda each: (len({*names} & {*each}), posterior_of[each].sum()),
     )
     noise, parts = table.likeliest_noise(key), table.parts[key]
     by_name = {table.names[part.component]: part for part in parts}
-    rms, added = {"": _rms(searched, noise, [])}, []
-    for name in (*names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
+    rms, added = {}, []
+    for name in ("", *names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
         if name in by_name:
             added.append(by_name[name])
-            rms[name] = _rms(searched, noise, added)
+        if name in by_name or not name:
+            left = problem.y - posterior(problem, noise, added).reading
+            rms[name] = float(np.sqrt(np.mean(left**2)))
     found = posterior(problem, noise, parts)
     left = (problem.y - found.reading) * noise.weight
     used = len(found.mean) - float(np.sum(found.factor**2))
     free = max(problem.count - used, 1.0)
     return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
-
-
-def _rms(searched: Searched, noise: NoiseModel, parts: Sequence[Part]) -> float:
-    problem = searched.problem
-    left = problem.y - posterior(problem, noise, parts).reading
-    return float(np.sqrt(np.mean(left**2)))

@@ -10,8 +10,7 @@ from hdcal.diagnosis.charts import gap_chart, ladder_chart, which_chart
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.next_run import NextRun
 from hdcal.diagnosis.patterns import Seen
-from hdcal.diagnosis.which import Cause, Which
-from hdcal.diagnosis.wording import share_words
+from hdcal.diagnosis.which import Cause, Which, share_words
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart

@@ -1,4 +1,4 @@
-"""Classes: effects whose curves coincide under this loading."""
+"""Classes: effects that these readings do not separate."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,9 @@ from hdcal.evidence.table import Names
 # Squared cosine of the angle between what the base model leaves of two effects from
 # which they are one class: within 18 degrees.
 ALIKE = 0.9
-# Effects of less probability lead no class.
-_LEAST = 0.01
+# An effect is excluded beside another one by odds of a hundred (Jeffreys, Theory of
+# Probability, 1961: decisive). Effects of less probability lead no class.
+_EXCLUDED = _LEAST = 0.01
 
 
 def classes(
@@ -22,8 +23,8 @@ def classes(
     """Return classes of effects on the mean reading, each with its likeliest first.
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
-    all whose curves, each fitted alone, coincide with it. An effect is in one class
-    only; those that neither are probable nor look like one that is, are in none.
+    all that the readings do not exclude beside it and whose curves, each fitted alone,
+    coincide with it. An effect is in one class at most.
 
     Args:
         searched: hypotheses of the case.
@@ -34,16 +35,18 @@ def classes(
         for name in chance.keys() & {*key}:
             chance[name] += float(each.sum())
     left = sorted(chance, key=lambda name: -chance[name])
-    alone = {name: _direction(searched, (name,), name) for name in left}
     found = []
     while left and chance[left[0]] > _LEAST:
         leader = left.pop(0)
-        key = max(
-            (key for key in posterior if leader in key),
-            key=lambda key: posterior[key].sum(),
-        )
-        curve = _direction(searched, key, leader)
-        alike = [name for name in left if float(curve @ alone[name]) ** 2 >= ALIKE]
+        keys = [key for key in posterior if leader in key]
+        key = max(keys, key=lambda key: posterior[key].sum())
+        curve, least = _direction(searched, key, leader), _EXCLUDED * chance[leader]
+        alike = [
+            name
+            for name in left
+            if chance[name] >= least
+            and (curve @ _direction(searched, (name,), name)) ** 2 >= ALIKE
+        ]
         left = [name for name in left if name not in alike]
         found.append((leader, *alike))
     return found
