@@ -35,19 +35,11 @@ def written(
     number: str = "%r",
     units: tuple[str, str, str] = ("mm", "N", "s"),
     sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
-    extra: bool = False,
 ) -> Case:
     """Return the case as read from a file, the length of the gear scaled to match.
 
-    Args:
-        case: readings.
-        folder: to write into.
-        force: factor of the force.
-        deformation: factor of the deformation.
-        number: format of a number.
-        units: of deformation, force and time.
-        sizes: of these units in mm, N and s.
-        extra: whether a column without meaning is added.
+    Force and deformation are multiplied by factors; `sizes` are those of the units of
+    deformation, force and time in mm, N and s.
     """
     r = case.records
     columns = {
@@ -55,9 +47,8 @@ def written(
         f"force_{units[1]}": force * np.asarray(r.force) / sizes[1],
         "temperature_C": np.asarray(r.temperature),
         f"time_{units[2]}": np.asarray(r.time) / sizes[2],
+        "remark": np.arange(len(r.force)) * 0.1,
     }
-    if extra:
-        columns["remark"] = np.arange(len(r.force)) * 0.1
     table = np.column_stack(list(columns.values())).tolist()
     lines = [",".join(columns)]
     lines += [",".join(number % value for value in row) for row in table]
@@ -77,7 +68,6 @@ CHANGES = {
         "units": ("um", "kN", "min"),
         "sizes": (1e-3, 1e3, 60.0),
     },
-    "a column without meaning": {"extra": True},
 }
 
 

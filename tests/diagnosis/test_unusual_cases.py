@@ -199,9 +199,3 @@ def test_what_is_no_case_no_library_and_no_seed_is_refused():
         quick(case, library=["hysteresis"])  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="seed"):
         quick(case, seed=-1)
-
-
-def test_what_was_not_measured_is_not_tested():
-    which = quick(simulated(ramp(14), seed=2)).which
-    assert which.not_testable["thermal_zero_drift"] == ("temperature",)
-    assert not {*which.not_testable} & {*which.inclusion}
