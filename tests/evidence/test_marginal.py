@@ -9,8 +9,8 @@ from scipy import integrate
 from scipy.stats import multivariate_normal
 
 from hdcal.evidence import marginal
-from hdcal.evidence.items import Amplitudes, Atoms, Space
 from hdcal.evidence.evaluation import Selection
+from hdcal.evidence.items import Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context

@@ -12,7 +12,7 @@ from hdcal.evidence.table import Names
 # Squared cosine of the angle between what the base model leaves of two effects from
 # which they are one class: within 18 degrees.
 ALIKE = 0.9
-# An effect is excluded beside another one by odds of a hundred (Jeffreys, Theory of
+# An effect is excluded by another one at odds of a hundred (Jeffreys, Theory of
 # Probability, 1961: decisive). Effects of less probability lead no class.
 _EXCLUDED = _LEAST = 0.01
 
@@ -23,7 +23,7 @@ def classes(
     """Return classes of effects on the mean reading, each with its likeliest first.
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
-    all that the readings do not exclude beside it and whose curves, each fitted alone,
+    all that the readings do not exclude given it and whose curves, each fitted alone,
     coincide with it. An effect is in one class at most.
 
     Args:

@@ -1,4 +1,4 @@
-"""Evidence of all items beside a context, under one model of the noise."""
+"""Evidence of all items given a context, under one model of the noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,13 +22,13 @@ _TOLERANCE_WEIGHTS = np.array([0.4, 0.3, 0.3])
 _NARROW = 4
 # Models of the noise whose whitened curves are kept: those of pairs.
 _KEPT = 2
-# Atoms of each effect that are evaluated beside tolerances and contexts.
+# Atoms of each effect that are evaluated given tolerances and contexts.
 _CHOSEN = 8
 
 
 @dataclass
 class Selection:
-    """Atoms and spaces that are compared beside every context.
+    """Atoms and spaces that are compared given every context.
 
     Attributes:
         problem: the case.
@@ -130,7 +130,7 @@ def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> Bloc
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Evidence of all items beside one context.
+    """Evidence of all items given one context.
 
     Attributes:
         selection: the items.

@@ -140,7 +140,7 @@ def outliers(
     Args:
         problem: the case.
         correlation: of the noise; none is tried as well.
-        fitted: weights of rows → mean reading beside some hypothesis.
+        fitted: weights of rows → mean reading given some hypothesis.
     """
     quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
     ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)

@@ -13,7 +13,7 @@ from hdcal.evidence.noise_models import NoiseModel
 
 
 class Context(NamedTuple):
-    """What is taken into the base beside which items are evaluated.
+    """What is taken into the base given which items are evaluated.
 
     Attributes:
         offset: fixed contribution [N].

@@ -43,7 +43,7 @@ class Block(NamedTuple):
 
 
 class _Curves(NamedTuple):
-    """Products of errors and slopes beside the base, and with what the base spans."""
+    """Products of errors and slopes less the base, and with what the base spans."""
 
     ee: Float[np.ndarray, " m"]
     eu: Float[np.ndarray, " m"]
@@ -58,7 +58,7 @@ class Projection:
     Attributes:
         problem: the case.
         noise: model of the noise.
-        square: square of the whitened readings beside the base.
+        square: square of the whitened readings with the base projected out.
         constant: part of every log evidence: priors and volume of the whitening.
     """
 
