@@ -1,5 +1,7 @@
 """Where the gap lies, which effect causes it, how far it closes, and what to test."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
@@ -13,7 +15,9 @@ from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.gap import GapByRow, fitted, gap_by_row
 from hdcal.diagnosis.next_run import rank_runs
+from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.result import Diagnosis
+from hdcal.evidence.linear_problem import linear_problem
 from hdcal.evidence.search import Searched, search
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.chart_spec import Band, Line
@@ -130,3 +134,33 @@ def test_the_gap_is_drawn_for_each_half_cycle():
     assert len(lines) == len([m for m in marks if isinstance(m, Band)]) == turns
     assert sum(len(line.x) for line in lines) == count
     assert all(np.all(np.diff(line.x) >= 0.0) for line in lines)
+
+
+# What is added to the force [N], the covariate, and the swing that it has.
+PATTERNS = {
+    "loop": (lambda r: -1.0 * r.sense, "direction", 2.0),
+    "zero": (lambda r: 0.05 * r.temperature, "temperature", 3.0),
+    "runs": (lambda r: 2.0 * (r.run >= 3), "run", 2.0),
+    "order": (lambda r: np.linspace(0.0, 3.0, len(r.run)), "order", 3.0),
+}
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_a_pattern_has_its_covariate_and_size(name: str):
+    add, covariate, swing = PATTERNS[name]
+    records = rich()
+    run = np.repeat(np.arange(6), 30)
+    records = replace(records, run=run, known=records.known | {"run", "runs"})
+    case = simulated(records, seed=1)
+    force = np.asarray(case.records.force) + np.asarray(add(case.records))
+    case = replace(
+        case,
+        records=replace(case.records, force=force),
+        run_labels=tuple(map(str, range(6))),
+    )
+    found = find_patterns(linear_problem(case, {}), case)
+    assert found[0].covariate == covariate and found[0].p_value < 1e-3
+    assert found[0].size_N.lo < swing < found[0].size_N.hi
+    assert 0.6 * swing < found[0].size_N.median < 1.5 * swing
+    assert found[0].material
+    assert not find_patterns(linear_problem(simulated(records, seed=1), {}), case)
