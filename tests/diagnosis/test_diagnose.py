@@ -10,10 +10,9 @@ from schema_checks import obeys
 
 from hdcal.diagnosis.candidate_runs import candidate_runs
 from hdcal.diagnosis.charts import gap_chart
-from hdcal.diagnosis.closing import closed_on_left_out
 from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.diagnose import diagnose
-from hdcal.diagnosis.gap import GapByRow, fitted, gap_by_row
+from hdcal.diagnosis.gap import GapByRow, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.result import Diagnosis

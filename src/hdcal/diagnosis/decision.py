@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.acting import Acting, acting
-from hdcal.diagnosis.classes import classes
+from hdcal.diagnosis.acting import Acting, acting, classes
 from hdcal.diagnosis.which import (
     ADEQUATE,
     LIKELY,

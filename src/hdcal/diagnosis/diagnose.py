@@ -12,9 +12,8 @@ from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.charts import FORMULA
-from hdcal.diagnosis.closing import closed_on_left_out
 from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide_searched
-from hdcal.diagnosis.gap import Fitted, fitted, gap_by_row
+from hdcal.diagnosis.gap import Fitted, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.patterns import find_patterns

@@ -165,8 +165,10 @@ def _log_density(count: int, log_sd, loose: _Loose, prior: Amplitudes):
     variance = np.exp(2.0 * log_sd)
     given = loose.given(variance)
     precision, score, mean = _amplitude(given, variance, prior)
-    root = np.sqrt(precision)
-    mass = log_interval((prior.low - mean) * root, (prior.high - mean) * root)
+    mass, root = 0.0, np.sqrt(precision)
+    # Amplitudes of spaces have no bounds.
+    if np.any(np.isfinite(prior.low) | np.isfinite(prior.high)):
+        mass = log_interval((prior.low - mean) * root, (prior.high - mean) * root)
     value = -count * log_sd - 0.5 * given.log_det - 0.5 * given.ee / variance
     value += 0.5 * score * mean - 0.5 * prior.precision * prior.mean**2
     return value + 0.5 * (_LOG_2PI - np.log(precision)) + mass + prior.log_height
