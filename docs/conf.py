@@ -18,6 +18,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "mathml",
+    "ranges",
     "schemas",
     "stiffness_pictures",
 ]
@@ -38,6 +39,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "hdcal"
 html_static_path = ["_static"]
 html_css_files = ["hdcal.css"]
+html_show_sourcelink = False
 # So few pages: all of them beside the text, none in the bar above it.
 html_sidebars = {"**": ["globaltoc.html"]}
 html_theme_options = {

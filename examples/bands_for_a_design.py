@@ -1,4 +1,4 @@
-"""How much force the design deformation takes, cold and warm, with bands."""
+"""Force at the design deformation, cold and warm, with bands."""
 
 from pathlib import Path
 

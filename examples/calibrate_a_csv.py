@@ -1,4 +1,4 @@
-"""From a CSV file to the stiffness of the gear and how sure it is."""
+"""From a CSV file to the stiffness of the gear and its uncertainty."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Name an effect of one's own from outside the library, beside all the others."""
+"""Add an effect to the library and let a diagnosis name it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +26,7 @@ class WarmFriction(
     slope: float = hdcal.parameter("N/K", "friction per kelvin", typical=0.02, null=0.0)
 
     def apply(self, signal, rows):
-        """Return the force with friction that the warmth brought."""
+        """Return the force with the friction added."""
         return signal + self.slope * rows.temperature_rise * rows.records.sense
 
 
@@ -36,7 +36,7 @@ def main() -> None:
     gear = replace(case.gear, effect_priors={"warm_friction.slope": prior})
     records = case.records
     rise = np.asarray(records.temperature) - gear.reference_temperature
-    # Simulated readings on the rows of the bundled test, of a gear that rubs when warm.
+    # Simulated readings on the rows of the bundled test, with friction when warm.
     stiffness = 200.0 * (1.0 - 3e-4 * rise)
     noise = np.random.default_rng(3).normal(0.0, 0.4, len(rise))
     force = stiffness * np.asarray(records.deformation) + noise
@@ -55,7 +55,7 @@ def main() -> None:
     )
     assert "warm_friction" not in without.which.inclusion
     assert without.which.outside.probability > 0.5
-    print("without it in the library something outside is said to act")
+    print("without it in the library something outside acts")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What moves the force most: its derivatives by every size of the gear."""
+"""Derivatives of the force by every size of the gear."""
 
 import jax
 
@@ -8,7 +8,7 @@ GEAR = hdcal.Geometry(
     wall_thickness=0.68, radius=40.0, length=70.0, load_height=62.0, poisson=0.29
 )
 MODULUS, INFLUENCE, DEFORMATION = 207e3, 2.6, 0.4  # MPa, -, mm
-# Half-widths of what a workshop holds [mm].
+# Half-widths of workshop tolerances [mm].
 TOLERANCES = {"wall_thickness": 0.02, "radius": 0.05, "length": 0.1}
 
 
@@ -36,7 +36,7 @@ def main() -> None:
         name: float(getattr(slope, name)) * width for name, width in TOLERANCES.items()
     }
     for name, swing in sorted(swings.items(), key=lambda item: -abs(item[1])):
-        print(f"{name:15} ± {TOLERANCES[name]} mm moves it by {swing:+7.3f} N")
+        print(f"{name:15} ± {TOLERANCES[name]} mm changes it by {swing:+7.3f} N")
 
     for name in TOLERANCES:
         exact, near = float(getattr(slope, name)), by_difference(name)

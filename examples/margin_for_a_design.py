@@ -1,4 +1,4 @@
-"""From six gears to an actuator: bounds for gears that were never measured."""
+"""From six gears to an actuator: bounds for gears that were not measured."""
 
 import tempfile
 from dataclasses import replace
@@ -14,13 +14,13 @@ AT, STIFFNESS, SPREAD, NOISE, GEARS = 0.4, 205.0, 0.03, 0.4, 6
 
 
 def measure(folder: Path) -> hdcal.Case:
-    """Six gears of a batch whose true stiffness is known here, eight readings each."""
+    """Return simulated readings of six gears of known stiffness, eight each."""
     rng = np.random.default_rng(8)
     rows = ["deformation_mm,force_N,specimen"]
     for gear in range(GEARS):
-        own = STIFFNESS * (1.0 + SPREAD * rng.normal())
+        stiffness = STIFFNESS * (1.0 + SPREAD * rng.normal())
         for deformation in np.linspace(0.05, 0.54, 8):
-            force = own * deformation + NOISE * rng.normal()
+            force = stiffness * deformation + NOISE * rng.normal()
             rows.append(f"{deformation:.4f},{force:.4f},{gear}")
     (folder / "data.csv").write_text("\n".join(rows) + "\n")
     case = hdcal.read_case(folder / "data.csv", GEAR)

@@ -1,4 +1,4 @@
-"""An effect of one's own, added from outside, and found in synthetic data."""
+"""A new effect, added from outside and recovered from synthetic data."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,10 +36,10 @@ TRUE_ERROR = 0.08
 
 
 def write_case(folder: Path) -> None:
-    """Write synthetic readings: 200 N/mm, the curved gauge, 0.1 N of noise."""
+    """Write synthetic readings: 200 N/mm, a curved gauge, 0.1 N of noise."""
     read = np.linspace(0.02, 0.6, 30)
-    seen = read + TRUE_ERROR * read**2
-    force = 200.0 * seen + np.random.default_rng(3).normal(0.0, 0.1, len(read))
+    true = read + TRUE_ERROR * read**2
+    force = 200.0 * true + np.random.default_rng(3).normal(0.0, 0.1, len(read))
     lines = [f"{x:.3f},{f:.3f}" for x, f in zip(read, force, strict=True)]
     table = "\n".join(["deformation_mm,force_N", *lines])
     (folder / "data.csv").write_text(table + "\n", encoding="utf-8")

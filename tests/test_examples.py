@@ -15,7 +15,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 LAST_LINES = {
     "bands_for_a_design.py": "the true forces lie inside the bands",
     "calibrate_a_csv.py": "the least-squares slope lies inside the interval",
-    "diagnose_a_gap.py": "without it in the library something outside is said to act",
+    "diagnose_a_gap.py": "without it in the library something outside acts",
     "gradient_of_force.py": "the derivatives agree with finite differences",
     "margin_for_a_design.py": ("the bound holds for the gears that were not measured"),
     "own_effect.py": "the truth lies inside the interval",

@@ -1,6 +1,7 @@
-"""What pages show of a run is what the run says: words exactly, numbers nearly.
+"""Pages show what runs print and what the library declares.
 
-Draws differ in their last digits from machine to machine: ends of intervals by 5 %.
+Words of a run exactly, numbers nearly: draws differ in their last digits from machine
+to machine, ends of intervals by 5 %.
 """
 
 import json
@@ -10,6 +11,11 @@ from pathlib import Path
 
 import pytest
 from commands import Hdcal
+
+from hdcal.data.prior import Prior
+from hdcal.data.priors import effect_priors
+from hdcal.physics.effect import parameters
+from hdcal.physics.registry import EFFECTS
 
 ROOT = Path(__file__).parents[1]
 NUMBER = r"-?\d+(?:\.\d+)?"
@@ -74,10 +80,10 @@ def test_a_page_that_shows_something_else_is_caught():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("page", ["tutorial", "study", "design"])
+@pytest.mark.parametrize("page", ["tutorial", "design"])
 def test_a_page_shows_what_its_commands_print(hdcal: Hdcal, tmp_path: Path, page: str):
     (tmp_path / "datasets").symlink_to(ROOT / "datasets")
-    runs = shown_runs((ROOT / "docs" / f"{page}.md").read_text("utf-8"))
+    runs = shown_runs((ROOT / "docs" / "howto" / f"{page}.md").read_text("utf-8"))
     assert any(shown for _, shown in runs)
     wanted = max(place for place, (_, shown) in enumerate(runs) if shown)
     wrong = []
@@ -100,3 +106,48 @@ def test_the_readme_states_what_the_demo_finds(hdcal: Hdcal, tmp_path: Path):
     assert stated is not None
     for words, end in zip(stated.groups(), ("median", "lo", "hi"), strict=True):
         assert float(words) == pytest.approx(found[end], abs=1.0)
+
+
+def prior_on_page(prior: Prior) -> str:
+    """Return a prior as the page of its effect states it."""
+    unit = "" if prior.unit == "1" else f" {prior.unit}"
+    words = {
+        "half_normal": "half-normal, sd {0:g}{unit}",
+        "normal": "normal, {0:g} ± {1:g}{unit}",
+        "lognormal": "lognormal, median {0:g}{unit}, log sd {1:g}",
+        "uniform": "uniform, {0:g} … {1:g}{unit}",
+        "beta": "beta({0:g}, {1:g})",
+    }[prior.family]
+    return words.format(*map(float, prior.numbers), unit=unit)
+
+
+def parameter_rows(effect: str) -> list[str]:
+    """Return the list of the parameters of an effect."""
+    priors = effect_priors()
+    return [
+        f"- `{name}`: {declared.meaning}; {prior_on_page(prior)}"
+        for name, declared in parameters(EFFECTS[effect]).items()
+        if (prior := priors[f"{effect}.{name}"])
+    ]
+
+
+def test_the_page_of_an_effect_lists_its_parameters_and_priors():
+    folder = ROOT / "docs" / "reference" / "effects"
+    assert {page.stem for page in folder.glob("*.md")} == {*EFFECTS, "index"}
+    for effect in EFFECTS:
+        page = (folder / f"{effect}.md").read_text("utf-8").splitlines()
+        assert [line for line in page if line.startswith("- `")] == parameter_rows(
+            effect
+        )
+
+
+@pytest.mark.parametrize(
+    ("page", "below"), [("reliability", "tests"), ("architecture", "src/hdcal")]
+)
+def test_the_files_that_a_page_names_exist(page: str, below: str):
+    text = (ROOT / "docs" / "reference" / f"{page}.md").read_text("utf-8")
+    named = re.findall(r"`([\w/]+\.py)`", text)
+    assert named
+    files = [f"/{path.as_posix()}" for path in (ROOT / below).rglob("*.py")]
+    missing = [n for n in named if not any(f.endswith(f"/{n}") for f in files)]
+    assert not missing

@@ -317,21 +317,6 @@ def test_every_option_that_takes_a_number_has_a_range(name: str):
     assert range_of(str(NUMBERS[name].name)).why
 
 
-def rows() -> list[str]:
-    """Return the table as docs/reliability.md has to print it."""
-    others = {name: [n for n, q in NAMES.items() if q == name] for name in RANGES}
-    return [
-        f"| {', '.join(f'`{n}`' for n in (name, *others[name]))} | {r.low:.10g} | "
-        f"{r.high:.10g} | {r.unit} | {r.why} |"
-        for name, r in RANGES.items()
-    ]
-
-
-def test_the_ranges_are_published():
-    text = Path(__file__).parents[1].joinpath("docs/reliability.md").read_text("utf-8")
-    assert "\n".join(rows()) in text
-
-
 def test_numbers_beyond_any_computer_are_refused():
     for value in (10**400, -(10**5000), float("inf")):
         with pytest.raises(InputError, match="does not lie between"):

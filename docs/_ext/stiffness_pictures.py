@@ -61,27 +61,6 @@ def toe_picture() -> Chart:
     return Chart(panels=[panel])
 
 
-def preload_picture() -> Chart:
-    """Return a spring with initial tension, with and without a zero of its own."""
-    x = np.linspace(0.0, 20.0, 60)
-    wound = np.minimum(5.0 * x, 8.0 + 2.1 * x)
-    y = wound + np.random.default_rng(2).normal(0.0, 0.15, x.size)
-    case = hdcal.read_case({"deformation_mm": x, "force_N": y})
-    assert case.screening is not None and case.screening.straight is not None
-    part = case.screening.straight
-    middle = float(np.mean([part.low, part.high]))
-    level = float(np.interp(middle, x, y))
-    origin = float(x @ y / (x @ x))
-    marks: list[Mark] = [
-        Span(low=part.low, high=part.high, axis="x", label="longest straight part"),
-        Points(label="readings", x=x, y=y, colour=GREY),
-        _line("line through the origin", origin, (0.0, 0.0), (0.0, 20.0), ORANGE),
-        _line("straight part", part.slope, (middle, level), (0.0, 20.0), BLUE),
-    ]
-    panel = Panel(x=_X, y=_Y, marks=marks, height=3.2, legend_beside=True)
-    return Chart(panels=[panel])
-
-
 def loop_picture() -> Chart:
     """Return loading and unloading with friction, and the slopes of both."""
     up = np.linspace(0.0, 10.0, 41)
@@ -124,7 +103,7 @@ def _line(
     return Line(label=f"{label}: {slope:.3g} N/mm", x=x, y=y, colour=colour)
 
 
-PICTURES = {"toe": toe_picture, "preload": preload_picture, "loop": loop_picture}
+PICTURES = {"toe": toe_picture, "loop": loop_picture}
 
 
 def draw(app: Sphinx) -> None:

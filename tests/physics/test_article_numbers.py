@@ -1,4 +1,4 @@
-"""The article's gear and its Table 2 give the numbers that docs/audit.md states."""
+"""The article's gear and its Table 2 give the numbers of docs/validation/audit.md."""
 
 import numpy as np
 import pytest

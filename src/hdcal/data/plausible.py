@@ -1,7 +1,7 @@
 """What numbers can be, whatever the rig: one wide range for everything that is given.
 
 A number beyond its range is a slip of the pen or of the unit; no honest rig, however
-large or small, comes near the ends. docs/reliability.md prints this table.
+large or small, comes near the ends. The documentation lists this table.
 """
 
 from typing import Any, NamedTuple

@@ -5,7 +5,8 @@ from importlib.resources.abc import Traversable
 from typing import Any
 
 # Pages that are made when the documentation is built.
-_FOR_THE_WEB = ("api", "schemas")
+_FOR_THE_WEB = ("api", "schemas", "ranges")
+_PAGE_FOLDERS = ("howto", "reference", "validation", "reference/effects")
 
 
 def priors_folder() -> Traversable:
@@ -34,8 +35,8 @@ def pages() -> dict[str, Traversable]:
     """
     root = _shipped("docs")
     found: dict[str, Traversable] = {}
-    for folder in (root / "howto", root, root / "effects"):
-        for page in sorted(folder.iterdir(), key=lambda page: page.name):
+    for folder in _PAGE_FOLDERS:
+        for page in sorted((root / folder).iterdir(), key=lambda page: page.name):
             name, dot, kind = page.name.rpartition(".")
             if dot and kind == "md" and name not in ("index", *_FOR_THE_WEB):
                 found[name] = page
