@@ -6,7 +6,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from diagnosis_cases import NOISE, simulated
+from diagnosis_cases import simulated
 from rigs import cycles
 from schema_checks import obeys
 from short import SHORT
@@ -23,7 +23,7 @@ LOOP = {"coulomb_friction": {"force": 2.0}}
 
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
-    case = simulated(cycles(60), LOOP, seed=1)
+    case = simulated(cycles(48), LOOP, seed=1)
     with pytest.MonkeyPatch.context() as patch:
         short = partial(calibrate, **SHORT)
         patch.setattr("hdcal.calibration.calibrate.calibrate", short)
@@ -70,23 +70,18 @@ def twisted() -> dict[str, np.ndarray]:
     return {"angle_rad": angle, "torque_Nm": torque}
 
 
-def test_torques_over_angles_are_told_in_their_units():
+def test_torques_over_angles_have_their_units():
     table = twisted()
     found = diagnose(read_case(table), quick=True)
     members = {name for cause in found.which.acting for name in cause.members}
     assert members & {"coulomb_friction", "hysteresis", "load_friction"}
     assert found.part == "part" and found.gap.noise_sd_N == pytest.approx(0.05, rel=0.2)
     jsonschema.validate(found.to_dict(), Diagnosis.json_schema(found.units))
-    text, names = found.page(), {*found.to_dict()["gap"]}
+    text, names = found.text(), {*found.to_dict()["gap"]}
     assert "N·m" in text and "N/mm" not in text and "gear" not in text.lower()
     assert names & {"rms_Nm", "rms_N_m"}
     assert "force" not in " ".join(one.statement for one in found.seen)
     grams = {"angle_rad": table["angle_rad"], "torque_Nm": 1e3 * table["torque_Nm"]}
+    assert "formula" not in " ".join(rung.model for rung in found.how_far.ladder)
     scaled = diagnose(read_case(grams), quick=True)
     assert scaled.which.inclusion == pytest.approx(found.which.inclusion, abs=0.05)
-
-
-def test_a_spring_has_no_formula_to_compare_with():
-    found = diagnose(read_case(twisted()), quick=True)
-    assert "formula" not in " ".join(rung.model for rung in found.how_far.ladder)
-    assert found.how_far.ladder[-1].rms_N < NOISE

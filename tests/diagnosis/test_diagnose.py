@@ -1,4 +1,4 @@
-"""Where the gap lies, which effect causes it, and how far it closes."""
+"""Where the gap lies, which effect causes it, how far it closes, and what to test."""
 
 from dataclasses import replace
 
@@ -8,14 +8,18 @@ from diagnosis_cases import rich, simulated
 from rigs import ramp
 from schema_checks import obeys
 
-from hdcal.diagnosis.closing import closed_on_left_out
-from hdcal.diagnosis.decision import TEMPERATURE, decide_searched
+from hdcal.diagnosis.candidate_runs import candidate_runs
+from hdcal.diagnosis.charts import gap_chart
+from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.diagnose import diagnose
-from hdcal.diagnosis.gap import fitted, gap_by_row
+from hdcal.diagnosis.gap import GapByRow, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.next_run import rank_runs
+from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.result import Diagnosis
+from hdcal.evidence.linear_problem import linear_problem
 from hdcal.evidence.search import Searched, search
 from hdcal.physics.registry import EFFECTS
+from hdcal.report.chart_spec import Band, Line
 
 HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
 
@@ -36,7 +40,7 @@ def closed(searched: Searched, name: str):
     return closed_on_left_out(searched, fit.noise, fit.noise_sd, [name], rng)[0]
 
 
-def test_the_true_effect_closes_the_gap_on_rows_it_never_saw(looped):
+def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):
     found = closed(looped, "hysteresis")
     assert found is not None and found.median > 0.8 and found.lo > 0.5
 
@@ -47,7 +51,7 @@ def test_another_effect_does_not(looped, name):
     assert found is not None and found.hi < 0.3
 
 
-def test_no_gap_has_no_share_that_is_known(plain):
+def test_the_share_that_closes_of_no_gap_is_not_known(plain):
     found = closed(plain, "hysteresis")
     assert found is None or found.hi - found.lo > 0.5
 
@@ -65,20 +69,25 @@ def test_the_gap_is_what_the_effect_adds(looped, plain):
     assert np.sqrt(np.mean(nothing.draws**2)) < 0.15 * np.std(added)
 
 
-def test_a_diagnosis_says_what_acts_and_how_much_of_the_gap_it_explains():
-    found = diagnose(simulated(rich(), HYSTERESIS, seed=1), quick=True)
+def test_a_diagnosis_contains_cause_share_ladder_and_notes():
+    case = simulated(rich(), HYSTERESIS, seed=1)
+    object.__setattr__(case, "notes", ("a note from reading",))
+    found = diagnose(case, quick=True)
     (cause,) = found.which.acting
     named = len(cause.members) == 1
     assert found.which.verdict == ("named" if named else "group")
     assert cause.members[0] == "hysteresis" and cause.probability > 0.9
     assert cause.explains is not None and cause.explains.lo > 0.8
-    assert "Hysteresis" in found.headline and "explains" in found.headline
+    assert "Hysteresis" in found.headline and "a note from reading" in found.page()
     sizes = [rung.rms_N for rung in found.how_far.ladder]
     assert sizes[:-1] == sorted(sizes[:-1], reverse=True)
     assert sizes[-1] == pytest.approx(found.gap.noise_sd_N)
     assert found.gap.rms_N is not None
     inside = found.gap.rms_N.lo, found.gap.rms_N.hi
     assert inside[0] < np.sqrt(sizes[1] ** 2 - sizes[-1] ** 2) < 1.1 * inside[1]
+    (loop,) = [each for each in found.seen if each.covariate == "direction"]
+    # Both branches of the hysteresis, 4 N each, fully developed on most of the stroke.
+    assert loop.size_N.lo > 3.0 and loop.size_N.hi < 9.0
     obeys(found.to_dict(), Diagnosis)
     assert {*found.charts()} == {"where", "which", "how_far"}
     assert found.average is None and found.stiffness_N_per_mm is None
@@ -88,11 +97,12 @@ def test_a_plain_case_has_no_gap_and_nothing_to_close():
     found = diagnose(simulated(rich(), seed=3), quick=True)
     assert found.which.verdict == "none" and not found.which.acting
     assert found.how_far.closed is None and found.gap.probability < 0.5
+    assert not found.seen
     obeys(found.to_dict(), Diagnosis)
 
 
-def test_runs_are_ranked_by_what_they_tell():
-    """A ramp cannot tell stiffening from other bends."""
+def test_suggested_runs_separate_hypotheses():
+    """A ramp does not separate stiffening from other bends."""
     case = simulated(ramp(60), {"progressive_stiffening": {"slope": 0.4}}, seed=1)
     searched = search(case, EFFECTS)
     rng = np.random.default_rng(0)
@@ -101,11 +111,55 @@ def test_runs_are_ranked_by_what_they_tell():
     assert all(one != two for one, two in (run.separates for run in runs))
 
 
-def test_a_stretch_of_rows_that_is_off_is_no_wild_reading():
-    case = simulated(rich(), seed=2)
-    force = np.array(case.records.force)
-    force[100:130] += 5.0
-    off = replace(case, records=replace(case.records, force=force))
-    found = decide_searched(search(off, EFFECTS))
-    assert found.which.inclusion["outliers"] < 0.1
-    assert found.which.outside.probability > 0.5
+def test_runs_that_were_measured_are_not_suggested():
+    new, measured = (
+        {run.words.split(" at ")[0] for run in candidate_runs(records, 20.0)}
+        for records in (ramp(60), rich())
+    )
+    done = {"load and unload", "load and unload four times faster"}
+    done |= {"load, then hold the top for a minute"}
+    assert done <= new and not done & measured
+    assert "load and unload ten times slower" in measured
+
+
+def test_the_gap_is_drawn_for_each_half_cycle():
+    case = simulated(rich(), seed=1)
+    count = len(case.records.force)
+    draws = np.tile(np.arange(count, dtype=float), (5, 1))
+    chart = gap_chart(case, GapByRow(case.records, np.zeros(count), draws))
+    marks = chart.panels[0].marks
+    lines = [mark for mark in marks if isinstance(mark, Line)]
+    turns = np.count_nonzero(np.diff(np.asarray(case.records.sense))) + 1
+    assert len(lines) == len([m for m in marks if isinstance(m, Band)]) == turns
+    assert sum(len(line.x) for line in lines) == count
+    assert all(np.all(np.diff(line.x) >= 0.0) for line in lines)
+
+
+# What is added to the force [N], the covariate, and the swing that it has.
+PATTERNS = {
+    "loop": (lambda r: -1.0 * r.sense, "direction", 2.0),
+    "zero": (lambda r: 0.05 * r.temperature, "temperature", 3.0),
+    "runs": (lambda r: 2.0 * (r.run >= 3), "run", 2.0),
+    "order": (lambda r: np.linspace(0.0, 3.0, len(r.run)), "order", 3.0),
+}
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_a_pattern_has_its_covariate_and_size(name: str):
+    add, covariate, swing = PATTERNS[name]
+    records = rich()
+    run = np.repeat(np.arange(6), 30)
+    records = replace(records, run=run, known=records.known | {"run", "runs"})
+    case = simulated(records, seed=1)
+    force = np.asarray(case.records.force) + np.asarray(add(case.records))
+    case = replace(
+        case,
+        records=replace(case.records, force=force),
+        run_labels=tuple(map(str, range(6))),
+    )
+    found = find_patterns(linear_problem(case, {}), case)
+    assert found[0].covariate == covariate and found[0].p_value < 1e-3
+    assert found[0].size_N.lo < swing < found[0].size_N.hi
+    assert 0.6 * swing < found[0].size_N.median < 1.5 * swing
+    assert found[0].material
+    assert not find_patterns(linear_problem(simulated(records, seed=1), {}), case)

@@ -9,9 +9,9 @@ from scipy import integrate
 from scipy.stats import multivariate_normal
 
 from hdcal.evidence import marginal
-from hdcal.evidence.components import Amplitudes, Atoms, Space
 from hdcal.evidence.evaluation import Selection
-from hdcal.evidence.linear_problem import Expansion, LinearProblem, linear_problem
+from hdcal.evidence.items import Amplitudes, Atoms, Space
+from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context
 from hdcal.evidence.projection import Projection
@@ -26,7 +26,7 @@ def small_problem() -> LinearProblem:
     case = make_case(records, make_gear())
     force = 195.0 * records.deformation + 1.0 + noise
     object.__setattr__(case.records, "force", force)
-    return linear_problem(case, {}, Expansion(noise_sd=NOISE))
+    return linear_problem(case, {}, noise_sd=NOISE)
 
 
 PROBLEM = small_problem()

@@ -34,13 +34,13 @@ def readings(seed: int) -> np.ndarray:
 
 
 def lookalikes() -> np.ndarray:
-    """Return gears in which two causes are as likely, and none is out of question."""
+    """Return gears in which two causes are as likely, and none is excluded."""
     found = np.tile([-40.0, 0.0, 0.0], (GEARS, 1))
     found[:, 2] -= 0.1
     return found
 
 
-@pytest.mark.parametrize("log_likelihood", [readings(0), readings(1), lookalikes()])
+@pytest.mark.parametrize("log_likelihood", [readings(0), lookalikes()])
 def test_draws_are_those_of_every_assignment(log_likelihood: np.ndarray):
     rng = np.random.default_rng(3)
     found = sample_frequencies(log_likelihood, COUNTS, rng, draws=3000)
@@ -52,7 +52,7 @@ def test_draws_are_those_of_every_assignment(log_likelihood: np.ndarray):
 
 
 def test_without_exchanges_lookalikes_are_not_left(monkeypatch: pytest.MonkeyPatch):
-    """The sampler that all know would tell that all gears have one of the two."""
+    """Plain Gibbs sampling would report that all gears have one of the two."""
     many = np.tile(lookalikes()[0], (30, 1))
 
     def mixed() -> bool:

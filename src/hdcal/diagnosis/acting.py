@@ -1,7 +1,7 @@
-"""What acts in the draws of each hypothesis, and which share of the gap it closes.
+"""Classes of effects, and the components that act in draws of each hypothesis.
 
-The gap is what the acting components leave beside the base model. A component acts in a
-draw where the rows show it: a coefficient that happens to be tiny is none.
+The gap is the sum of the acting components, with the base model projected out. A
+component acts in a draw where the rows show it: a tiny coefficient does not act.
 """
 
 from collections import defaultdict
@@ -12,21 +12,78 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.diagnosis.which import MATTERS
-from hdcal.evidence.parts import sampled_curves
+from hdcal.evidence.parts import mean_curves, sampled_curves
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
 
 # A component acts from this squared visible length on, in noise variances.
 _SHOWN = 6.0
-# Hypotheses of less probability are not drawn from: all that they contain acts.
+# No draws are made of less probable hypotheses: all that they contain acts.
 NEGLIGIBLE, DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
 CARRIED = 0.5
+# Squared cosine of the angle between what the base model leaves of two effects from
+# which they are one class: within 18 degrees.
+ALIKE = 0.9
+# An effect is excluded by another one at odds of a hundred (Jeffreys, Theory of
+# Probability, 1961: decisive). Effects of less probability lead no class.
+_EXCLUDED = _LEAST = 0.01
+
+
+def classes(
+    searched: Searched, posterior: Mapping[Names, np.ndarray]
+) -> list[tuple[str, ...]]:
+    """Return classes of effects on the mean reading, each with its likeliest first.
+
+    The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
+    all that the readings do not exclude given it and whose curves, each fitted alone,
+    coincide with it. An effect is in one class at most.
+
+    Args:
+        searched: hypotheses of the case.
+        posterior: probability of each, by model of the noise.
+    """
+    chance = dict.fromkeys(searched.table.names[:-1], 0.0)
+    for key, each in posterior.items():
+        for name in chance.keys() & {*key}:
+            chance[name] += float(each.sum())
+    left = sorted(chance, key=lambda name: -chance[name])
+    found = []
+    while left and chance[left[0]] > _LEAST:
+        leader = left.pop(0)
+        keys = [key for key in posterior if leader in key]
+        key = max(keys, key=lambda key: posterior[key].sum())
+        curve, least = _direction(searched, key, leader), _EXCLUDED * chance[leader]
+        alike = [
+            name
+            for name in left
+            if chance[name] >= least
+            and (curve @ _direction(searched, (name,), name)) ** 2 >= ALIKE
+        ]
+        left = [name for name in left if name not in alike]
+        found.append((leader, *alike))
+    return found
+
+
+def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, " n"]:
+    """Return what the base model leaves of an effect of a hypothesis, of unit length.
+
+    At the fitted shape, rows weighted by their stated noise. Zero where the hypothesis
+    has no evidence.
+    """
+    table, problem = searched.table, searched.problem
+    parts = table.parts.get(key)
+    if parts is None:
+        return np.zeros(len(problem.y))
+    curves = mean_curves(problem, table.likeliest_noise(key), parts)
+    names = [table.names[part.component] for part in parts]
+    curve = curves[names.index(name)]
+    return curve / max(float(np.linalg.norm(curve)), 1e-300)
 
 
 @dataclass(frozen=True)
 class Acting:
-    """Draws of one hypothesis and noise model that agree in what acts.
+    """Draws of one hypothesis and noise model in which the same components act.
 
     Attributes:
         weight: their probability.
@@ -66,7 +123,7 @@ def acting(
     class_of: Mapping[str, str],
     rng: np.random.Generator,
 ) -> list[Acting]:
-    """Return what acts in each hypothesis and noise model.
+    """Return the components that act in each hypothesis and noise model.
 
     Args:
         searched: hypotheses of the case.
@@ -85,12 +142,9 @@ def acting(
         whole = [Acting(1.0, key, "", {}, np.ones(1), np.zeros(0))]
         for name, weight in by_noise.items():
             for each in drawn if weight >= NEGLIGIBLE and drawn else whole:
-                found.append(_weighted(each, weight, name))
+                share = each.weight * weight
+                found.append(replace(each, weight=share, noise=name))
     return found
-
-
-def _weighted(each: Acting, weight: float, noise: str) -> Acting:
-    return replace(each, weight=each.weight * weight, noise=noise)
 
 
 def _drawn(
@@ -111,7 +165,7 @@ def _drawn(
     shown = visible > _SHOWN * problem.noise_sd**2
     shown &= np.mean(curves**2, axis=2) > least**2
     gaps = np.einsum("kd,kdn->dn", shown, curves)
-    # What points away from the gap only makes up for another component.
+    # A component that points away from the gap only compensates another one.
     shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)

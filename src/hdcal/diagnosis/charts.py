@@ -8,8 +8,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.loading import movement_words
 from hdcal.diagnosis.gap import GapByRow
-from hdcal.diagnosis.which import LIKELY, Cause, Which
-from hdcal.diagnosis.wording import ALL, either
+from hdcal.diagnosis.which import ALL, LIKELY, Cause, Which, either
 from hdcal.quantities import Quantities
 from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.chart_spec import (
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
 # Classes that are shown, the least probability of one, and from which on its share of
 # the gap is written with it.
 _MOST, _LEAST = 8, 0.01
-# Names of a class beside its bar.
-_NAMES = 3
 # With more half cycles than this bands would cover each other: medians stay.
 _MOST_BANDS = 40
 _COLOURS = {1: BLUE, -1: ORANGE}
@@ -131,7 +128,7 @@ def which_chart(which: "Which") -> Chart:
 
 
 def _name(cause: "Cause") -> str:
-    words = either(cause.members, _NAMES) if cause.members else "outside the library"
+    words = either(cause.members) if cause.members else "outside the library"
     if cause.explains and cause.probability > LIKELY:
         share = cause.explains.median
         words += f": {'all' if share >= ALL else percent(share)} of the gap"

@@ -13,25 +13,15 @@ from hdcal.cli.options import (
     take_reading,
 )
 
-# With more cases than this reports are made only when asked for.
-MANY = 20
-
 
 @command(short_help="Where, why and how far the model is off.")
 @reading_options
 @click.argument("cases", metavar="CASE...", nargs=-1, required=True)
 @library_option
 @click.option("--quick", is_flag=True, help="Answer without sampling: no margins.")
+@click.option("--no-report", is_flag=True, help="Leave out figures and report.")
 @click.option(
-    "--report/--no-report",
-    default=None,
-    help=f"Figures and report of every case [default: with up to {MANY} cases].",
-)
-@click.option(
-    "--jobs",
-    default=1,
-    show_default=True,
-    help="Processes to share many cases.",
+    "--jobs", default=1, show_default=True, help="Processes to share many cases."
 )
 @seed_option
 @click.option(
@@ -42,46 +32,46 @@ MANY = 20
 @force_option
 @json_option
 @click.pass_obj
-def diagnose(console: Console, cases, out, force, **settings):
+def diagnose(console: Console, cases, out, force, jobs, no_report, **settings):
     """Find the gap between model and measurement of each CASE, and its cause.
 
     Of one CASE the result is DIR itself, of several DIR/NAME each.
     """
+    from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import (
-        REFUSED,
-        diagnose_all,
-        overview,
+        all_findings,
+        diagnose_into,
+        diagnose_many,
         read_cases,
-        tell_notes,
     )
-    from hdcal.physics.registry import EFFECTS
 
+    many, found, refused = len(cases) > 1, [], {}
     with console.wrong as wrong:
-        wrong += implausible("jobs", settings["jobs"])
+        wrong += implausible("jobs", jobs)
         wrong += implausible("seed", settings["seed"])
-        wrong.attempt(choose_library, settings["library"], EFFECTS)
-        reading, asked = take_reading(settings), None
+        wrong.attempt(choose_library, settings["library"])
+        reading = take_reading(settings)
         if reading["columns"] is not None:
-            asked = wrong.attempt(read_cases, cases, **reading)
-        if out is None and asked is not None:
-            out = asked.folder
+            read = wrong.attempt(read_cases, cases, **reading)
+            found, refused = read or (found, refused)
+        if out is None and found:
+            out = "diagnosis" if many else f"{found[0].name}-diagnosis"
         console.reserve_folder(out, force)
-        if wrong and asked is not None:
-            wrong.extend(asked.findings)
-    assert asked is not None and console.folder is not None
-    tell_notes(console, asked)
-    if settings["report"] is None:
-        settings["report"] = len(asked.found) <= MANY
-        if not settings["report"]:
-            console.words(f"more than {MANY} cases: no reports without --report")
+        if wrong:
+            wrong.extend(all_findings(refused))
+    assert found and console.folder is not None
+    for case in found:
+        for note in case.notes:
+            console.words(f"{case.name}: {note}" if many else note)
+    how = {"command": console.command, "report": not no_report, **settings}
     with console.folder.filled() as folder:
-        found, left = diagnose_all(asked, folder, command=console.command, **settings)
-        together = overview(found, left.refused)
-        if asked.many:
-            (folder / REFUSED).write_text(together.to_json(), "utf-8")
-    (one, *_) = found.values()
-    shown = together if one.shown is None else one.shown
-    code = console.show_written(shown)
-    return 2 if left.refused else code
+        if many:
+            shown = diagnose_many(found, refused, folder, jobs=jobs, **how)
+            return_code = 2 if shown.refused else 0
+        else:
+            with progress_bar("diagnosing") as progress:
+                shown = diagnose_into(folder, found[0], progress=progress, **how)
+            return_code = 0
+    return max(console.show_written(shown), return_code)

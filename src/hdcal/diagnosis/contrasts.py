@@ -1,4 +1,4 @@
-"""Contrasts that a diagnosis looks at: one thing each that readings may show."""
+"""Contrasts of readings: simple patterns, each a column and the words for it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,76 +16,68 @@ from hdcal.physics.history import load_cycle
 _TOE, _HEAD = 0.25, 0.75
 # Shares of the range over which a gradual loop changes over.
 _REACHES = np.array([0.03, 0.1, 0.3])
-# More runs or gears than these are not told one by one.
+# Of more runs or gears than these none is a contrast.
 _MOST_MEMBERS = 24
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """One thing that readings may show.
+    """One pattern that readings may have.
 
     Attributes:
-        covariate: with which it goes.
-        column: how, shape (n,).
+        covariate: on which it depends.
+        column: its shape, shape (n,).
         ways: the words for {way} where the coefficient is positive, and negative.
         words: a statement with {way} and {size}, to be formatted.
-        beside: over which it is the swing off a straight line; None for its own.
-        share: of the swing that is told.
+        off_line: whether its size is the swing off a straight line over x.
+        share: of the swing that is its size.
     """
 
     covariate: str
     column: np.ndarray
     ways: tuple[str, str]
     words: str
-    beside: np.ndarray | None = None
+    off_line: bool = False
     share: float = 1.0
 
-    @property
-    def told_once(self) -> str:
-        """What it has in common with others of which only the clearest is told."""
-        return self.words if self.covariate == "direction" else ""
-
-    @property
-    def swing(self) -> float:
-        """Difference of the highest and the lowest place of the column."""
+    def swing(self, x: np.ndarray) -> float:
+        """Return the difference of the highest and the lowest place of the column."""
         column = self.column
-        if self.beside is not None:
-            column = column - np.polyval(
-                np.polyfit(self.beside, column, 1), self.beside
-            )
+        if self.off_line:
+            column = column - np.polyval(np.polyfit(x, column, 1), x)
         return self.share * float(np.ptp(column))
 
 
 def contrasts(
-    records: Records, case: Case, *, both: bool, own: bool
+    records: Records, case: Case, *, both: bool, known_alpha: bool
 ) -> Iterator[Contrast]:
-    """Yield what records may show.
+    """Yield the patterns that records may have.
 
     Args:
         records: of which the force has the sign of the deformation.
         case: for labels.
-        both: there is compression and tension.
-        own: what the material loses with heat is known.
+        both: whether there is compression and tension.
+        known_alpha: whether the material's loss of modulus with temperature is known.
     """
     deformation = np.asarray(records.deformation)
     x = deformation / np.max(np.abs(deformation))
     yield from _along_the_stroke(x, both=both)
     yield from _over_direction(records, x, both=both)
     yield from _over_time(records, x)
-    yield from _over_temperature(records, x, own=own)
+    yield from _over_temperature(records, x, known_alpha=known_alpha)
     yield from _of_members(records, case, x)
 
 
 def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
     side, depth = np.sign(x) if both else np.ones_like(x), np.abs(x)
-    # Through zero a curve swings to both sides; what is told is that of one.
+    # Through zero a curve swings to both sides; its size is that of one.
     share = 0.5 if both else 1.0
     yield Contrast(
         "deformation",
         side * depth**2,
         ("stiffens", "softens"),
         "the curve {way} with the {{displacement}}, {size} off a straight line",
-        beside=x,
+        off_line=True,
         share=share,
     )
     yield Contrast(
@@ -107,39 +99,34 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
 def _over_direction(
     records: Records, x: np.ndarray, *, both: bool
 ) -> Iterator[Contrast]:
-    """Yield loops of even width, and what makes them wider or narrower.
-
-    The force may change over at once at a turn, or gradually.
-    """
+    """Yield loops of even width, sudden or gradual, and loops that widen or narrow."""
     sense = np.asarray(records.sense, float)
-    down, up = ("unloading", "loading")
+    down, up = "unloading", "loading"
     while_down, while_up = f"on {down}", f"on {up}"
     if both:
         down, up = "decreasing {{displacement}}", "increasing"
         while_down = "while the {{displacement}} decreases"
         while_up = "while it increases"
-    ways = ("lower", "higher")
     words = f"the {{{{load}}}} lies {{size}} {{way}} {while_down} than {while_up}"
-    yield Contrast("direction", sense, ways, words)
-    if "unloading" in records.known:
-        for cell in loop_cells(records, _REACHES):
-            yield Contrast("direction", cell, ways, words)
+    cells = loop_cells(records, _REACHES) if "unloading" in records.known else []
+    for column in (sense, *cells):
+        yield Contrast("direction", column, ("lower", "higher"), words)
     words = (
         f"the larger the {{{{displacement}}}}, the {{way}} {down} lies against {up}, "
         "by {size} over the range"
     )
-    yield Contrast("direction", sense * np.abs(x), ways, words)
+    yield Contrast("direction", sense * np.abs(x), ("lower", "higher"), words)
 
 
 def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
-    # Of one speed there and back, the rate tells the direction and nothing else.
+    # With one speed in both directions the rate is the direction.
     if "rates" in records.known:
         yield Contrast(
             "rate",
             np.asarray(records.rate),
             ("more", "less"),
             "a faster movement takes {way} {{load}}, by {size} over the speeds tested",
-            beside=x,
+            off_line=True,
         )
     # A place that was read twice, as where the movement turns, was not held.
     if "holds" in records.known:
@@ -148,23 +135,23 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
             _held(records),
             ("rises", "falls"),
             "while the {{displacement}} is held the {{load}} {way} by {size}",
-            beside=x,
+            off_line=True,
         )
     yield Contrast(
         "time",
         np.asarray(records.time),
         ("up", "down"),
         "the {{load}} drifts {way} by {size} within a run",
-        beside=x,
+        off_line=True,
     )
     yield Contrast(
         "order",
         np.linspace(0.0, 1.0, len(x)),
         ("rises", "falls"),
         "from the first reading to the last the {{load}} {way} by {size}",
-        beside=x,
+        off_line=True,
     )
-    # Whole cycles: where loading and unloading differ in slope, half of one is no less.
+    # Whole cycles: loading and unloading may differ in slope.
     cycle = np.asarray(_load_cycle(padded_records(records)))[: len(x)]
     yield Contrast(
         "order",
@@ -172,7 +159,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         ("rises", "falls"),
         "the slope {way} from cycle to cycle, which moves the {{load}} by {size} in "
         "all",
-        beside=x,
+        off_line=True,
     )
 
 
@@ -191,25 +178,17 @@ def _held(records: Records) -> np.ndarray:
 
 
 def _over_temperature(
-    records: Records, x: np.ndarray, *, own: bool
+    records: Records, x: np.ndarray, *, known_alpha: bool
 ) -> Iterator[Contrast]:
-    warm = np.asarray(records.temperature)
-    beyond = " beyond the material's own" if own else ""
-    yield Contrast(
-        "temperature",
-        warm,
-        ("rises", "falls"),
-        "the zero {way} with temperature, by {size} over the range tested",
-        beside=x,
-    )
-    yield Contrast(
-        "temperature",
-        (warm - warm.mean()) * x,
-        ("rises", "falls"),
+    warm, ways = np.asarray(records.temperature), ("rises", "falls")
+    words = "the zero {way} with temperature, by {size} over the range tested"
+    yield Contrast("temperature", warm, ways, words, off_line=True)
+    beyond = " beyond the material's own" if known_alpha else ""
+    words = (
         f"the slope {{way}} with temperature{beyond}, "
-        "which moves the {{load}} by {size}",
-        beside=x,
+        "which moves the {{load}} by {size}"
     )
+    yield Contrast("temperature", (warm - warm.mean()) * x, ways, words, off_line=True)
 
 
 def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contrast]:
@@ -221,7 +200,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
                 ("goes", "goes"),
                 f"the stiffness {{way}} with the angle, {often} a turn, "
                 "which moves the {{load}} by {size}",
-                beside=x,
+                off_line=True,
             )
     runs = [*map(_literally, case.run_labels)]
     gears = [*map(_literally, case.specimen_labels)]
@@ -232,14 +211,6 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             ("up", "down"),
             f"the zero steps {{way}} by {{size}} from run {runs[k - 1]} to {runs[k]}",
         )
-    # The first and the last against the others are steps.
-    for k in range(1, len(runs) - 1 if len(runs) <= _MOST_MEMBERS else 0):
-        yield Contrast(
-            "run",
-            (np.asarray(records.run) == k).astype(float),
-            ("higher", "lower"),
-            f"the zero of run {runs[k]} lies {{size}} {{way}} than that of the others",
-        )
     for k in range(len(gears) if 1 < len(gears) <= _MOST_MEMBERS else 0):
         yield Contrast(
             "specimen",
@@ -247,10 +218,10 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             ("stiffer", "softer"),
             f"gear {gears[k]} is {{way}} than the others, "
             "which moves its {{load}} by {size}",
-            beside=x,
+            off_line=True,
         )
 
 
 def _literally(label: str) -> str:
-    """Return a label that formatting leaves as it was."""
+    """Return a label that formatting leaves unchanged."""
     return label.replace("{", "{{").replace("}", "}}")

@@ -1,4 +1,4 @@
-"""The decision: what acts, how much of the gap it closes, and what may explain it."""
+"""The decision: which effects act, and which share of the gap they close."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -7,36 +7,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.acting import Acting, acting
-from hdcal.diagnosis.adequacy import adequacy_p_value
-from hdcal.diagnosis.likeness import classes
+from hdcal.diagnosis.acting import Acting, acting, classes
 from hdcal.diagnosis.which import (
     ADEQUATE,
     LIKELY,
     NAMED,
+    ON_NOISE,
     Cause,
     Explanation,
     VerdictWord,
     Which,
 )
-from hdcal.evidence.noise_models import GROWING, OUTLIERS
+from hdcal.evidence.parts import posterior
 from hdcal.evidence.search import Searched, search
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.physics.effect import Effect
-from hdcal.report.item import INTERVAL, Interval
+from hdcal.report.item import TAILS, Interval
 
 # By which log evidences are divided. On learning rounds of the blind check, 940 cases,
 # the mean log score grows up to 2.0, by 0.05 nat from here. Above this value fewer than
 # four in five causes of gaps as large as the noise are stated with 90 %.
 TEMPERATURE = 1.6
-# Probability of the credible set.
-_CREDIBLE = 0.9
-_ON_NOISE = (GROWING, OUTLIERS)
+# Probability of the credible set, and draws of the check of an explanation.
+_CREDIBLE, _DRAWS = 0.9, 300
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What a case tells about what its base model lacks.
+    """What a case shows about what its base model lacks.
 
     Attributes:
         gap: probability that something acts.
@@ -65,7 +63,7 @@ def decide(
     temperature: float = TEMPERATURE,
     seed: int = 0,
 ) -> Decision:
-    """Say what acts in a case.
+    """Decide what acts in a case.
 
     Args:
         case: gear and records.
@@ -82,57 +80,47 @@ def decide(
 def decide_searched(
     searched: Searched, *, temperature: float = TEMPERATURE, seed: int = 0
 ) -> Decision:
-    """Say what acts, given the evidence of all hypotheses."""
+    """Decide what acts, given the evidence of all hypotheses."""
     rng, table = np.random.default_rng(seed), searched.table
-    posterior = table.posterior(temperature)
-    groups = classes(searched, posterior)
+    chance = table.posterior(temperature)
+    groups = classes(searched, chance)
     class_of = {name: group[0] for group in groups for name in group}
-    found = acting(searched, posterior, class_of, rng)
-    effects = searched.predicting.effects
-    groups += [(name,) for name in _ON_NOISE if name in effects]
+    found = acting(searched, chance, class_of, rng)
+    predicting = searched.predicting
+    on_noise = [name for name in ON_NOISE if name in predicting.effects]
+    groups += [(name,) for name in on_noise]
     causes = [_cause(members, found) for members in groups]
     causes.sort(key=lambda each: -each.probability)
-    explanations = _explanations(found)
-    likeliest = max(posterior, key=lambda key: posterior[key].sum())
+    outside, explanations = _cause((OUTSIDE,), found), _explanations(found)
+    likeliest = max(chance, key=lambda key: chance[key].sum())
     p_value = adequacy_p_value(searched, likeliest, rng)
     gap = 1.0 - sum(each.probability for each in explanations if each.nothing)
+    # The smallest set with the credible probability.
+    total = np.cumsum([each.probability for each in explanations])
+    credible = explanations[: int(np.searchsorted(total, _CREDIBLE)) + 1]
+    names = [*table.names[:-1], *on_noise]
+    which = Which(
+        verdict=_verdict(causes, outside, gap, fits=p_value >= ADEQUATE),
+        causes=tuple(causes),
+        outside=outside,
+        explanations=credible,
+        inclusion={name: _cause((name,), found).probability for name in names},
+        fits=p_value >= ADEQUATE,
+        p_value=p_value,
+        not_testable={n: tuple(each) for n, each in predicting.lacking.items()},
+    )
     return Decision(
         gap=gap,
         gap_N=_interval([(each.rms, each.weight) for each in found if each.components]),
-        which=_which(searched, found, causes, explanations, gap, p_value),
+        which=which,
         explanations=explanations,
-        hypotheses=_hypotheses(searched, posterior),
+        hypotheses=_hypotheses(searched, chance),
         coarse_step=searched.coarse_step,
     )
 
 
-def _which(
-    searched: Searched,
-    found: Sequence[Acting],
-    causes: Sequence[Cause],
-    explanations: tuple[Explanation, ...],
-    gap: float,
-    p_value: float,
-) -> Which:
-    """Return what acts in a word, in classes and in explanations."""
-    outside, fits = _cause((OUTSIDE,), found), p_value >= ADEQUATE
-    effects = searched.predicting.effects
-    names = [*searched.table.names[:-1], *(n for n in _ON_NOISE if n in effects)]
-    lacking = searched.predicting.lacking
-    return Which(
-        verdict=_verdict(causes, outside, gap, fits),
-        causes=tuple(causes),
-        outside=outside,
-        explanations=_credible(explanations),
-        inclusion={name: _cause((name,), found).probability for name in names},
-        fits=fits,
-        p_value=p_value,
-        not_testable={name: tuple(columns) for name, columns in lacking.items()},
-    )
-
-
 def _verdict(
-    causes: Sequence[Cause], outside: Cause, gap: float, fits: bool
+    causes: Sequence[Cause], outside: Cause, gap: float, *, fits: bool
 ) -> VerdictWord:
     """Return the answer in a word.
 
@@ -181,8 +169,7 @@ def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
     order = np.argsort(values)
     weights = weights[order] / weights.sum()
     place = np.cumsum(weights) - 0.5 * weights
-    tail = 0.5 * (1.0 - INTERVAL)
-    low, median, high = np.interp((tail, 0.5, 1.0 - tail), place, values[order])
+    low, median, high = np.interp(TAILS, place, values[order])
     return Interval(median=float(median), lo=float(low), hi=float(high))
 
 
@@ -192,30 +179,59 @@ def _explanations(found: Sequence[Acting]) -> tuple[Explanation, ...]:
     for each in found:
         for names, share in each.explanations().items():
             chance[names] += each.weight * share
-    ranked = sorted(chance, key=lambda names: (-chance[names], names))
     return tuple(
         Explanation(
             effects=tuple(name for name in names if name != OUTSIDE),
             outside=OUTSIDE in names,
             probability=min(chance[names], 1.0),
         )
-        for names in ranked
+        for names in sorted(chance, key=lambda names: (-chance[names], names))
     )
 
 
-def _credible(explanations: tuple[Explanation, ...]) -> tuple[Explanation, ...]:
-    """Return the smallest set with the credible probability."""
-    total = np.cumsum([each.probability for each in explanations])
-    return explanations[: int(np.searchsorted(total, _CREDIBLE)) + 1]
-
-
 def _hypotheses(
-    searched: Searched, posterior: Mapping[Names, np.ndarray]
+    searched: Searched, chance: Mapping[Names, np.ndarray]
 ) -> dict[Names, float]:
     """Return the probability of components on the mean with effects on the noise."""
-    chance: dict[Names, float] = defaultdict(float)
-    for key, row in posterior.items():
+    found: dict[Names, float] = defaultdict(float)
+    for key, row in chance.items():
         for noise, each in zip(searched.table.noises, row, strict=True):
             names = (*key, noise.name) if noise.name else key
-            chance[tuple(sorted(names))] += float(each)
-    return dict(chance)
+            found[tuple(sorted(names))] += float(each)
+    return dict(found)
+
+
+def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -> float:
+    """Return how often noise alone leaves as much structure as the readings do.
+
+    A posterior predictive check. Structure is the largest of the shares of the
+    residuals that the kernels of the remainder span, each in sds of what noise makes
+    it.
+
+    Args:
+        searched: hypotheses of the case.
+        key: the hypothesis.
+        rng: source of randomness.
+    """
+    problem, noise = searched.problem, searched.table.likeliest_noise(key)
+    if not searched.kernels:
+        return 1.0
+    fit = posterior(problem, noise, searched.table.parts[key])
+
+    def white(curves):
+        return problem.whiten(curves, noise.weight, noise.correlation)
+
+    half = fit.factor @ white(fit.columns.T) / problem.noise_sd
+    readings = white((problem.y - fit.offset)[None])
+    simulated = rng.standard_normal((_DRAWS, len(problem.y)))
+    errors = np.concatenate([readings, simulated])
+    errors = errors - (errors @ half.T) @ half
+    errors = errors / np.linalg.norm(errors, axis=1, keepdims=True)
+    inside = [
+        np.log(np.sum((errors @ white(kernel).T) ** 2, axis=1) + 1e-300)
+        for kernel in searched.kernels
+    ]
+    table = np.stack(inside, axis=1)
+    null = table[1:]
+    largest = np.max((table - null.mean(axis=0)) / null.std(axis=0), axis=1)
+    return float((1 + np.sum(largest[1:] >= largest[0])) / (_DRAWS + 1))

@@ -12,15 +12,12 @@ from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.charts import FORMULA
-from hdcal.diagnosis.closing import closed_on_left_out
-from hdcal.diagnosis.decision import (
-    TEMPERATURE,
-    decide_searched,
-)
-from hdcal.diagnosis.gap import Fitted, fitted, gap_by_row
+from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide_searched
+from hdcal.diagnosis.gap import Fitted, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
-from hdcal.diagnosis.refit import Refits, failures, refit, rows_to_calibrate
+from hdcal.diagnosis.patterns import find_patterns
+from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate
 from hdcal.diagnosis.result import (
     Data,
     Diagnosis,
@@ -29,9 +26,7 @@ from hdcal.diagnosis.result import (
     Refit,
     Rung,
 )
-from hdcal.diagnosis.seen import what_is_seen
-from hdcal.diagnosis.which import LIKELY
-from hdcal.diagnosis.wording import effect_words
+from hdcal.diagnosis.which import LIKELY, effect_words
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.noise_models import OUTLIERS
 from hdcal.evidence.search import Searched, search
@@ -56,7 +51,7 @@ def diagnose(
     seed: int = 0,
     progress: "Progress | None" = None,
 ) -> Diagnosis:
-    """Say where model and readings part, which effect causes it and how far it closes.
+    """Find where model and readings part, which effect causes it, how far it closes.
 
     Args:
         case: from `read_case`.
@@ -66,8 +61,8 @@ def diagnose(
         progress: called with (iterations done, iterations in all) while sampling.
 
     Raises:
-        InputError: the library is none, an effect has no prior, the seed is none, the
-            force does not grow with the deformation, or readings do not scatter.
+        InputError: library or seed is invalid, an effect has no prior, the force does
+            not grow with the deformation, or readings do not scatter.
     """
     require_case(case)
     effects = library_of(library)
@@ -78,32 +73,26 @@ def diagnose(
     posterior = searched.table.posterior(TEMPERATURE)
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
-    calibrated = case if quick else rows_to_calibrate(case)
-    fits = refit(calibrated, found.hypotheses, effects, seed, progress, quick=quick)
-    largest = float(np.max(np.abs(case.records.force)))
-    on_mean = names or found.which.outside.probability > LIKELY
-    size = found.gap_N if on_mean else None
+    calibrated, fits = case, Refits({}, None, {})
+    if not quick:
+        calibrated = rows_to_calibrate(case)
+        fits = refit(calibrated, found.hypotheses, effects, seed, progress)
+    ranked = sorted(fits.posteriors.items(), key=lambda item: -item[1][0])
     return Diagnosis(
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
-        gap=Gap(
-            probability=found.gap,
-            rms_N=size,
-            noise_sd_N=fit.noise_sd,
-            share_of_full_scale=size.median / largest if size else None,
-            correlation=fit.noise.correlation,
-        ),
-        seen=what_is_seen(searched.problem, case),
+        gap=_gap(case, found, fit),
+        seen=find_patterns(searched.problem, case),
         which=found.which,
         how_far=_how_far(case, searched, fit, names, rng),
         next_test=tuple(
             run.model_copy(update={"run": case.units.say(run.run)})
             for run in rank_runs(searched, posterior, rng)
         ),
-        refits=_ranked(fits),
+        refits=tuple(Refit(hypothesis=n, probability=p) for n, (p, _) in ranked),
         left_out=fits.left_out,
         stiffness_N_per_mm=_stiffness(fits),
-        reasons=() if fits.posteriors else failures(fits),
+        reasons=() if fits.posteriors else fits.failures,
         coarse_step_N=found.coarse_step,
         library=tuple(effects),
         seed=seed,
@@ -113,7 +102,7 @@ def diagnose(
             rows=len(case.records.force),
             rows_diagnosed=len(searched.problem.y),
             sha256=case.data_sha256,
-            notes=(*calibrated.notes, *failures(fits)),
+            notes=(*calibrated.notes, *fits.failures),
         ),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
@@ -140,9 +129,19 @@ def _check(case: Case, effects: Mapping[str, type[Effect]], seed: int) -> None:
     raise InputError([Finding(case.name, words, remedy)])
 
 
-def _ranked(fits: Refits) -> tuple[Refit, ...]:
-    ranked = sorted(fits.posteriors.items(), key=lambda item: -item[1][0])
-    return tuple(Refit(hypothesis=n, probability=share) for n, (share, _) in ranked)
+def _gap(case: Case, found: Decision, fit: Fitted) -> Gap:
+    """Return size and probability of the gap; its size where it is on the mean."""
+    which, size = found.which, found.gap_N
+    if not (which.on_mean or which.outside.probability > LIKELY):
+        size = None
+    largest = float(np.max(np.abs(case.records.force)))
+    return Gap(
+        probability=found.gap,
+        rms_N=size,
+        noise_sd_N=fit.noise_sd,
+        share_of_full_scale=size.median / largest if size else None,
+        correlation=fit.noise.correlation,
+    )
 
 
 def _stiffness(fits: Refits) -> Interval | None:
@@ -166,21 +165,15 @@ def _how_far(
     if names:
         closed, word = closed_on_left_out(searched, fit.noise, fit.noise_sd, names, rng)
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
-    ladder += [
-        Rung(model=_model(name), rms_N=size)
-        for name, size in fit.rms.items()
-        if name != OUTSIDE or len(fit.rms) > 1
-    ]
+    for name, size in fit.rms.items():
+        if name != OUTSIDE or len(fit.rms) > 1:
+            words = "outside the library" if name == OUTSIDE else effect_words(name)
+            model = f"+ {words}" if name else "calibrated straight model"
+            ladder.append(Rung(model=model, rms_N=size))
     wild = fit.noise.name == OUTLIERS
     noise = "noise without wild readings" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
     return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
-
-
-def _model(added: str) -> str:
-    if not added:
-        return "calibrated straight model"
-    return f"+ {'outside the library' if added == OUTSIDE else effect_words(added)}"
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

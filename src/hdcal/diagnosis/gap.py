@@ -1,18 +1,27 @@
-"""The gap between the base model and the readings, row by row."""
+"""The gap between base model and readings: row by row, and how far effects close it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from hdcal.data.records import Records
+from hdcal.evidence.components import Components, components
+from hdcal.evidence.evaluation import select
+from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Part, posterior, sampled_curves
+from hdcal.evidence.parts import Part, join, posterior, sampled_curves
+from hdcal.evidence.row_features import half_cycles, place_in_run
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
+from hdcal.physics.effects.scatter import Scatter
+from hdcal.report.item import TAILS, Interval
 
-_DRAWS = 600
+# Draws of the gap, and of the share that closes.
+_DRAWS, _SAMPLES = 600, 1000
+# With fewer half cycles all rows are cut into stretches.
+_FEWEST_HALVES = 4
 
 
 @dataclass(frozen=True)
@@ -20,7 +29,7 @@ class GapByRow:
     """What the base model leaves of the readings.
 
     Attributes:
-        records: the rows that were looked at, run after run: all, means of neighbours,
+        records: the rows that were diagnosed, run after run: all, means of neighbours,
             or one of several.
         residual: reading less the base model fitted alone [N], shape (n,).
         draws: of the gap, over all hypotheses [N], shape (d, n).
@@ -38,8 +47,8 @@ class Fitted:
     Attributes:
         noise: its model of the noise.
         noise_sd: of a typical row [N].
-        rms: what is left beside the base model, then with each effect besides, then
-            with what is outside the library [N], by what was added last.
+        rms: what the base model leaves, then with each effect in addition, then with a
+            remainder outside the library [N], by what was added last.
     """
 
     noise: NoiseModel
@@ -80,26 +89,27 @@ def fitted(
     posterior_of: Mapping[Names, np.ndarray],
     names: Sequence[str],
 ) -> Fitted:
-    """Return the likeliest of the hypotheses that hold most of some effects.
+    """Return the likeliest of the hypotheses that contain most of some effects.
 
     Args:
         searched: hypotheses of the case.
         posterior_of: probability of each, by model of the noise.
-        names: of the effects on the mean reading; some of a hypothesis.
+        names: of the effects on the mean reading; a hypothesis contains two at most.
     """
     problem, table = searched.problem, searched.table
-    # A hypothesis holds two effects at most, and more may act.
     key = max(
         posterior_of,
         key=lambda each: (len({*names} & {*each}), posterior_of[each].sum()),
     )
     noise, parts = table.likeliest_noise(key), table.parts[key]
     by_name = {table.names[part.component]: part for part in parts}
-    rms, added = {"": _rms(searched, noise, [])}, []
-    for name in (*names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
+    rms, added = {}, []
+    for name in ("", *names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
         if name in by_name:
             added.append(by_name[name])
-            rms[name] = _rms(searched, noise, added)
+        if name in by_name or not name:
+            left = problem.y - posterior(problem, noise, added).reading
+            rms[name] = float(np.sqrt(np.mean(left**2)))
     found = posterior(problem, noise, parts)
     left = (problem.y - found.reading) * noise.weight
     used = len(found.mean) - float(np.sum(found.factor**2))
@@ -107,7 +117,121 @@ def fitted(
     return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
 
 
-def _rms(searched: Searched, noise: NoiseModel, parts: Sequence[Part]) -> float:
+def closed_on_left_out(
+    searched: Searched,
+    noise: NoiseModel,
+    noise_sd: float,
+    names: Sequence[str],
+    rng: np.random.Generator,
+) -> tuple[Interval | None, str]:
+    """Return the share of the gap that effects close on rows left out of the fit.
+
+    The rows are left out block by block: half cycles, or stretches where there are few.
+    Base model and effects are fitted to the others, the shapes of the effects included.
+    The share is 1 − √(G₁/G₀), G the mean square of what is left beyond the noise.
+
+    Args:
+        searched: hypotheses of the case.
+        noise: model of the noise.
+        noise_sd: of a typical row [N].
+        names: effects that are added together.
+        rng: source of randomness.
+
+    Returns:
+        Median and interval over resampled blocks and the error of the noise sd, None
+        where no block shows a gap; and what was left out.
+    """
     problem = searched.problem
-    left = problem.y - posterior(problem, noise, parts).reading
-    return float(np.sqrt(np.mean(left**2)))
+    effects = {name: searched.predicting.effects[name] for name in names}
+    members = any(issubclass(effect, Scatter) for effect in effects.values())
+    block, word = _blocks(problem, by_member=members)
+    library, count = components(effects, problem), int(block.max()) + 1
+    table = np.array(
+        [_errors(problem, library, noise, noise_sd, block == k) for k in range(count)]
+    )
+    rows = np.bincount(block).astype(float)
+    picked = rng.multinomial(count, np.full(count, 1.0 / count), _SAMPLES)
+    before, after, spread = (picked * rows @ table / (picked @ rows)[:, None]).T
+    # The relative error of a noise variance that so many rows determine.
+    free = max(problem.count - problem.X.shape[1] - len(names), 1)
+    off = free / rng.chisquare(free, _SAMPLES) - 1.0
+    closed = _closed(before - off, after - off)
+    # With few blocks the variance of the prediction is known roughly only: the lower
+    # end does without it.
+    careful = _closed(before - off, after + spread - off)
+    if np.isfinite(closed).mean() < 0.5:
+        return None, word
+    whole = rows @ table / rows.sum()
+    middle = float(_closed(whole[0], whole[1]))
+    middle = float(np.nanmedian(closed)) if np.isnan(middle) else middle
+    low, high = np.nanquantile(careful, TAILS[0]), np.nanquantile(closed, TAILS[2])
+    low, high = min(float(low), middle), max(float(high), middle)
+    return Interval(median=middle, lo=low, hi=high), word
+
+
+def _closed(before, after):
+    with np.errstate(invalid="ignore", divide="ignore"):
+        gap = np.where(before > 0.0, before, np.nan)
+        return 1.0 - np.sqrt(np.maximum(after, 0.0) / gap)
+
+
+def _blocks(
+    problem: LinearProblem, *, by_member: bool
+) -> tuple[Int[np.ndarray, " n"], str]:
+    """Return the block of each row, and the word for a block.
+
+    Args:
+        problem: the case.
+        by_member: whether members differ. Nothing predicts a member without any row of
+            it, so that a block is a quarter of each.
+    """
+    records = problem.records
+    if by_member:
+        quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
+        return quarter.astype(int), "a quarter of each run"
+    word = "a half cycle" if "unloading" in records.known else "a stretch of rows"
+    halves = half_cycles(records)
+    if halves[-1] + 1 >= _FEWEST_HALVES:
+        return halves, word
+    rows = len(halves)
+    count = int(np.clip(rows // 3, 2, 6))
+    return np.minimum(np.arange(rows) * count // rows, count - 1), word
+
+
+def _errors(
+    problem: LinearProblem,
+    library: Components,
+    noise: NoiseModel,
+    noise_sd: float,
+    left_out: Bool[np.ndarray, " n"],
+) -> Float[np.ndarray, " 3"]:
+    """Return mean squared errors on some rows of models that were fitted without them.
+
+    In noise variances of a row: the base model's, less the noise and less the variance
+    of the prediction; the same with the effects; and the variance of that prediction.
+    """
+    rest = problem.without(left_out)
+    others = noise._replace(weight=np.where(left_out, 0.0, noise.weight))
+    weight = noise.weight[left_out] / noise_sd
+
+    def error(parts: Sequence[Part]) -> tuple[float, float]:
+        found = posterior(rest, others, parts)
+        off = (problem.y - found.reading)[left_out] * weight
+        sd = np.linalg.norm(found.columns[left_out] @ found.factor.T, axis=1) * weight
+        return float(np.mean(off**2 - sd**2)) - 1.0, float(np.mean(sd**2))
+
+    return np.array([error([])[0], *error(_fitted(rest, library, others))])
+
+
+def _fitted(
+    problem: LinearProblem, library: Components, noise: NoiseModel
+) -> list[Part]:
+    """Return effects at their most probable items, one after the other."""
+    selection = select(problem, [noise], library, [], library.names)
+    parts: list[Part] = []
+    for _ in library.names:
+        found = selection.evaluate(noise, join(problem, parts))
+        gain = found.totals()
+        gain[[part.component for part in parts]] = -np.inf
+        parts.append(found.likeliest(int(np.argmax(gain))))
+    return parts

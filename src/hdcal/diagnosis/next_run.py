@@ -1,8 +1,8 @@
-"""Which run would tell most about the cause: expected information in nats.
+"""Which run gives most information about the cause.
 
 The information of a run about which hypothesis is true is that between the index of the
-hypothesis and its Gaussian predictive. What is outside the library predicts nothing and
-is left out.
+hypothesis and its Gaussian predictive [nat]. A remainder outside the library predicts
+nothing and is left out.
 """
 
 from collections import defaultdict
@@ -15,8 +15,7 @@ from jaxtyping import Float
 
 from hdcal.data.records import Records
 from hdcal.diagnosis.candidate_runs import ROWS, candidate_runs
-from hdcal.evidence.components import atom_on_runs, space_on_runs
-from hdcal.evidence.linear_problem import base_columns
+from hdcal.evidence.base_model import base_columns
 from hdcal.evidence.parts import Part, coefficients, posterior
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
@@ -27,11 +26,11 @@ _MOST, _DRAWS, _LEAST_NATS, _LEAST_SHARE = 6, 256, 0.02, 0.01
 
 
 class NextRun(Item):
-    """One run that a rig can do and what it would tell.
+    """One run that a rig can do, and its information.
 
     Attributes:
         run: what to do, in words.
-        separates: the two hypotheses that it would tell apart best.
+        separates: the two hypotheses that it would separate best.
         information_nats: expected information about which effect it is.
         cost: in words, such as "one ramp".
     """
@@ -43,7 +42,7 @@ class NextRun(Item):
 
 
 class _Readings(NamedTuple):
-    """Normal readings of runs under each hypothesis, and of one run likewise.
+    """Normal readings of runs under each hypothesis.
 
     Attributes:
         mean: shape (r, h, m) [N].
@@ -59,18 +58,17 @@ def rank_runs(
     posterior_of: Mapping[Names, np.ndarray],
     rng: np.random.Generator,
 ) -> tuple[NextRun, ...]:
-    """Rank runs by what they would tell about the cause for their effort, best first.
+    """Rank runs by their information about the cause for their effort, best first.
 
     Args:
         searched: hypotheses of the case.
         posterior_of: probability of each, by model of the noise.
         rng: source of randomness.
     """
-    share = _candidates(searched, posterior_of)
-    if len(share) < 2:
-        return ()
-    problem = searched.problem
+    share, problem = _candidates(searched, posterior_of), searched.problem
     runs = candidate_runs(problem.records, problem.reading.reference_temperature)
+    if len(share) < 2 or not runs:
+        return ()
     weight, names = np.array([*share.values()]), [*share]
     predicted = _predicted(searched, names, [run.records for run in runs])
     # The same random numbers for every run: they are compared with each other.
@@ -93,10 +91,7 @@ def rank_runs(
 def _candidates(
     searched: Searched, posterior_of: Mapping[Names, np.ndarray]
 ) -> dict[Names, float]:
-    """Return the likeliest effects and pairs, and none, with their shares.
-
-    What stands beside them outside the library tells a run nothing.
-    """
+    """Return the most probable effects and pairs, and none, with their shares."""
     share: dict[Names, float] = defaultdict(float)
     for key, chance in posterior_of.items():
         names = tuple(name for name in key if name != OUTSIDE)
@@ -105,14 +100,14 @@ def _candidates(
     best = sorted(share, key=lambda names: -share[names])[:_MOST]
     best = [names for names in best if share[names] >= _LEAST_SHARE]
     if len(best) > 2 and () in best:
-        # That there is a gap is settled by more of the same; which one is not.
+        # More of the same readings shows whether there is a gap, not its cause.
         best.remove(())
     total = sum(share[names] for names in best)
     return {names: share[names] / total for names in best}
 
 
 def _differing(one: Names, two: Names) -> tuple[Names, Names]:
-    """Return hypotheses without what they share, unless one lies in the other."""
+    """Return hypotheses without their common effects, unless one contains the other."""
     left, right = ({*one} - {*two}), ({*two} - {*one})
     return (tuple(sorted(left)), tuple(sorted(right))) if left and right else (one, two)
 
@@ -120,11 +115,14 @@ def _differing(one: Names, two: Names) -> tuple[Names, Names]:
 def _predicted(
     searched: Searched, keys: Sequence[Names], runs: Sequence[Records]
 ) -> _Readings:
-    """Return the readings of each run after all that were taken, runs first."""
+    """Return the readings of each run after all that were measured."""
     problem, table = searched.problem, searched.table
     about = problem.reading, problem.priors, problem.base, problem.log_sd
     base = np.stack([base_columns(run, *about) for run in runs])
-    after = _after(problem.records, runs)
+    after = jax.tree.map(
+        lambda before, *new: np.stack([np.concatenate([before, n]) for n in new]),
+        *(problem.records, *runs),
+    )
     curves: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
     mean, covariance = [], []
     for key in keys:
@@ -148,31 +146,18 @@ def _predicted(
     return _Readings(np.stack(mean, axis=1), np.stack(covariance, axis=1))
 
 
-def _after(old: Records, runs: Sequence[Records]) -> Records:
-    """Return each run with all records before it, runs first."""
-    return jax.tree.map(
-        lambda before, *new: np.stack([np.concatenate([before, n]) for n in new]),
-        *(old, *runs),
-    )
-
-
 def _on_runs(
     searched: Searched, part: Part, after: Records
 ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, "r j m"]]:
     """Return offset and columns of a part on each run, history included."""
-    selection, problem = searched.selection, searched.problem
+    selection, component = searched.selection, part.component
     assert part.place is not None
-    effect = searched.predicting.effects[selection.names[part.component]]
-    if np.any(selection.atoms.owner == part.component):
-        atom = selection.atoms.pick(np.array([part.place.row]))
-        offset, slope = atom_on_runs(effect, problem, atom, after)
-        return offset[:, -ROWS:], slope[:, None, -ROWS:]
-    count, nothing = len(after.force), np.zeros((len(after.force), ROWS))
-    shape = selection.spaces[part.place.row].shape
-    if shape < 0:
-        # Members of a new run or gear are new: nothing is known of them.
-        return nothing, np.zeros((count, len(part.columns), ROWS))
-    return nothing, space_on_runs(effect, problem, shape, after)[..., -ROWS:]
+    if np.any(selection.atoms.owner == component):
+        item = selection.atoms.pick(np.array([part.place.row]))
+    else:
+        item = selection.spaces[part.place.row]
+    found = searched.components.on_runs(searched.problem, component, item, after)
+    return found[0][:, -ROWS:], found[1][..., -ROWS:]
 
 
 def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -> float:
@@ -192,7 +177,7 @@ def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -
 
 
 def _farthest(predicted: _Readings, share: Float[np.ndarray, " h"]) -> tuple[int, int]:
-    """Return the two hypotheses that lie farthest apart."""
+    """Return the two hypotheses whose readings differ most."""
     one, two = np.triu_indices(len(share), 1)
     gap = predicted.mean[one] - predicted.mean[two]
     both = predicted.covariance[one] + predicted.covariance[two]

@@ -1,11 +1,10 @@
-"""The hypotheses that are left by NUTS, each with the probability that it carries.
+"""Calibration of the probable hypotheses by NUTS, each with its probability.
 
-Every hypothesis of 5 % and more is calibrated, whatever the verdict. What is left out
-is not shared out among them: where it is more than 2 %, a model with a leftover
-discrepancy is calibrated too and carries it, as it bends wherever the data let it: the
-plain one, or that of the likeliest effect where most of what is left out is this effect
-and something more. Below that the widest model does, the one that knows the stiffness
-least.
+Every hypothesis of 5 % and more is calibrated, whatever the verdict. Where the others
+have more than 2 % together, a model with a leftover discrepancy is calibrated too and
+stands for them, as it bends wherever the data let it: the plain model with a leftover,
+or that of the likeliest effect where most of the others contain this effect. Below that
+the model that knows the stiffness least stands for them.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.evidence.fewer_rows import thin_rows
+from hdcal.evidence.row_features import thin_rows
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from hdcal.inference.sample import Progress
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
-# to a model of something else.
+# without a model with a leftover.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
 # Rows from which on a model takes minutes and more to calibrate.
 _MOST_ROWS = 5_000
@@ -39,7 +38,7 @@ class Refits:
         posteriors: probability and posterior by hypothesis, of those that may be used;
             `none` for the plain model, `unknown` for that with a leftover gap. The
             probabilities sum to 1.
-        left_out: what has no model among these; None without any.
+        left_out: probability without a model among these; None without any model.
         failed: calibrations that failed their checks.
     """
 
@@ -48,10 +47,11 @@ class Refits:
     failed: Mapping[str, Posterior]
 
     @property
-    def likeliest(self) -> str | None:
-        """Name of the most probable one."""
-        return max(
-            self.posteriors, key=lambda name: self.posteriors[name][0], default=None
+    def failures(self) -> tuple[str, ...]:
+        """The calibrations that failed their checks, and why."""
+        return tuple(
+            f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
+            for name, fit in self.failed.items()
         )
 
 
@@ -71,8 +71,6 @@ def refit(
     library: dict[str, type[Effect]],
     seed: int,
     progress: "Progress | None",
-    *,
-    quick: bool = False,
 ) -> Refits:
     """Calibrate every hypothesis that is probable enough by NUTS.
 
@@ -82,19 +80,17 @@ def refit(
         library: effects by name.
         seed: of the sampler.
         progress: of it.
-        quick: calibrate nothing.
     """
-    if quick:
-        return Refits({}, None, {})
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
-    probabilities = {_name(names): chance for names, chance in hypotheses.items()}
+    names = {key: "+".join(key).replace(OUTSIDE, UNKNOWN) or NONE for key in hypotheses}
+    probabilities = {names[key]: chance for key, chance in hypotheses.items()}
     count, finished = len(_probable(probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
         nonlocal finished
-        own, before = _parts(name), finished
+        parts, before = _parts(name), finished
 
         def tell(done: int, total: int) -> None:
             assert progress is not None
@@ -103,8 +99,8 @@ def refit(
         finished += 1
         return calibrate(
             case,
-            effects=tuple(sorted(own - {UNKNOWN})),
-            with_gap=UNKNOWN in own,
+            effects=tuple(sorted(parts - {UNKNOWN})),
+            with_gap=UNKNOWN in parts,
             adapt_noise=False,
             seed=seed,
             registry=library,
@@ -114,22 +110,16 @@ def refit(
     return weighed(probabilities, calibrated)
 
 
-def _name(names: Names) -> str:
-    """Return the name under which a model is stored."""
-    return "+".join(names).replace(OUTSIDE, UNKNOWN) or NONE
-
-
 def weighed(
     probabilities: Mapping[str, float], calibrated: Callable[[str], Posterior]
 ) -> Refits:
-    """Return the hypotheses that are kept, with what they carry.
+    """Return the hypotheses that are kept, with their probabilities.
 
     Args:
         probabilities: of all hypotheses, sum 1.
         calibrated: returns the posterior of one.
     """
-    chosen = _probable(probabilities)
-    fits = {name: calibrated(name) for name in chosen}
+    fits = {name: calibrated(name) for name in _probable(probabilities)}
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)
@@ -142,7 +132,9 @@ def weighed(
     if not usable:
         return Refits({}, None, failed)
     missing = _missing(probabilities, fits)
-    carrier = carrier if carrier in usable else _widest(usable)
+    if carrier not in usable:
+        width = {n: float(np.std(f.draws["stiffness"])) for n, f in usable.items()}
+        carrier = UNKNOWN if UNKNOWN in usable else max(width, key=width.__getitem__)
     models = {
         name: (probabilities.get(name, 0.0) + missing * (name == carrier), fit)
         for name, fit in usable.items()
@@ -165,10 +157,7 @@ def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):
 def _open_model(
     probabilities: Mapping[str, float], fits: Mapping[str, Posterior]
 ) -> str:
-    """Return the model with a leftover that suits most of what has no model.
-
-    What is the likeliest effect and a little more is no gap without that effect.
-    """
+    """Return the model with a leftover that suits most of what has no model."""
     usable = {name for name, fit in fits.items() if fit.usable}
     effects = frozenset().union(*map(_parts, usable)) - {UNKNOWN}
 
@@ -185,17 +174,3 @@ def _open_model(
 def _parts(hypothesis: str) -> frozenset[str]:
     """Return the effects of a hypothesis, and `unknown` where it has a leftover."""
     return frozenset(hypothesis.split("+")) - {NONE}
-
-
-def _widest(fits: Mapping[str, Posterior]) -> str:
-    if UNKNOWN in fits:
-        return UNKNOWN
-    return max(fits, key=lambda name: float(np.std(fits[name].draws["stiffness"])))
-
-
-def failures(fits: Refits) -> tuple[str, ...]:
-    """Say which calibrations failed their checks, and why."""
-    return tuple(
-        f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
-        for name, fit in fits.failed.items()
-    )

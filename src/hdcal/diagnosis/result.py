@@ -9,9 +9,8 @@ from hdcal.data.case import Case
 from hdcal.diagnosis.charts import gap_chart, ladder_chart, which_chart
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.next_run import NextRun
-from hdcal.diagnosis.seen import Seen
-from hdcal.diagnosis.which import Cause, Which
-from hdcal.diagnosis.wording import share_words
+from hdcal.diagnosis.patterns import Seen
+from hdcal.diagnosis.which import Cause, Which, share_words
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import Chart
@@ -35,7 +34,7 @@ class Gap(Item):
     Attributes:
         probability: that something acts which the base model lacks.
         rms_N: of the gap over the rows, where there is one.
-        noise_sd_N: of a reading, beside the likeliest explanation.
+        noise_sd_N: of a reading, given the likeliest explanation.
         share_of_full_scale: rms over the largest force.
         correlation: of the noise of neighbouring readings.
     """
@@ -100,16 +99,16 @@ class Data(Item):
 
 
 class Diagnosis(Result):
-    """What `hdcal diagnose` answers of one case; verdict.json.
+    """Result of `hdcal diagnose` on one case; verdict.json.
 
     Attributes:
         gap: whether there is one.
-        seen: what readings show whatever its cause, the clearest first.
+        seen: patterns of the readings whatever their cause, the clearest first.
         which: effects that cause it.
         how_far: it closes once they are added.
-        next_test: runs that would tell more, best first.
+        next_test: suggested runs, the most informative for their effort first.
         refits: calibrated models, the most probable first; none of a quick diagnosis.
-        left_out: hypotheses without a calibration of their own.
+        left_out: hypotheses without a separate calibration.
         stiffness_N_per_mm: as read, over the calibrated models.
         coarse_step_N: step of forces that are read coarsely; 0 where they are not.
         library: names of the effects that were considered.

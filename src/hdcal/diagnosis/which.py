@@ -1,21 +1,65 @@
-"""Which effects act: classes of effects, explanations, and the answer in a word."""
+"""Which effects act: classes of effects, explanations, and their sentences."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 from pydantic import computed_field
 
-from hdcal.diagnosis.wording import either, on_noise, share_words, together
+from hdcal.evidence.noise_models import GROWING, OUTLIERS
 from hdcal.report.item import EffectName, Interval, Item, Probability, Words
+from hdcal.report.words import label
 
-# From this probability on an effect is said to act, and to be named.
+# From these probabilities on an effect is reported as acting, and as named.
 LIKELY, NAMED = 0.5, 0.9
 # A gap matters from this rms on, as a share of the largest force: the error of
 # interpolation that ISO 376 allows its best class of force gauges, 00.
 MATTERS = 2.5e-4
 # Least p-value of an explanation that fits.
 ADEQUATE = 0.01
+# From this share on an effect explains all of the gap, and below the other nothing
+# that counts.
+ALL, _LITTLE = 0.99, 0.01
+# Names of a class in a sentence: where there are more, two and the number of others.
+_MOST = 3
+_WORDS = {
+    GROWING: "noise that grows with the load",
+    OUTLIERS: "wild readings",
+    "coulomb_friction": "Coulomb friction",
+}
+ON_NOISE = (GROWING, OUTLIERS)
 
 VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
+
+
+def effect_words(name: str) -> str:
+    """Return the name of an effect in a sentence."""
+    return _WORDS.get(name, label(name))
+
+
+def together(effects: Sequence[str]) -> str:
+    """Return effects that act together, those on the noise last."""
+    return " + ".join(map(effect_words, sorted(effects, key=ON_NOISE.__contains__)))
+
+
+def either(members: Sequence[str]) -> str:
+    """Return effects that are not separated: `a, b or c`, the most probable first."""
+    words = [*map(effect_words, members)]
+    if len(words) > _MOST:
+        others = len(words) - _MOST + 1
+        words = [*words[: _MOST - 1], f"one of {others} others"]
+    *first, last = words
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def share_words(share: Interval) -> str:
+    """Return a share of the gap with its interval."""
+    ends = [round(100.0 * end) for end in (share.lo, share.hi)]
+    if share.median >= ALL:
+        least = f" (at least {ends[0]} %)" if ends[0] < 100 else ""
+        return f"all of the gap{least}"
+    if share.hi < 1.5 * _LITTLE:
+        return "less than 2 % of the gap"
+    return f"{round(100.0 * share.median)} % ({ends[0]} … {ends[1]} %) of the gap"
 
 
 class Cause(Item):
@@ -23,7 +67,7 @@ class Cause(Item):
 
     Attributes:
         members: their names; none of something outside the library.
-        probability: that one of them acts, alone, in a pair, or beside something else.
+        probability: that one of them acts, alone, in a pair, or with a remainder.
         explains: share of the gap's rms that they close where they act; None of effects
             on the noise.
     """
@@ -35,7 +79,7 @@ class Cause(Item):
     @property
     def on_noise(self) -> bool:
         """Whether they act on the noise, not on the mean reading."""
-        return any(map(on_noise, self.members))
+        return any(name in ON_NOISE for name in self.members)
 
     @property
     def merged(self) -> bool:
@@ -142,13 +186,10 @@ class Which(Item):
     def on_mean(self) -> tuple[Cause, ...]:
         """Acting classes on the mean reading, those that explain most first."""
         found = [each for each in self.acting if not each.on_noise]
-        return tuple(sorted(found, key=_explained, reverse=True))
+        shares = {c: c.explains.median if c.explains else 0.0 for c in found}
+        return tuple(sorted(found, key=lambda each: -shares[each]))
 
     @property
     def on_noise(self) -> tuple[Cause, ...]:
         """Acting effects on the noise."""
         return tuple(each for each in self.acting if each.on_noise)
-
-
-def _explained(cause: Cause) -> float:
-    return cause.explains.median if cause.explains else 0.0

@@ -1,27 +1,24 @@
-"""Effects as atoms and spaces: pieces in which their contribution is linear.
+"""Effects of a library as atoms and spaces.
 
-An atom is one curve, offset + slope · a, with a prior of the amplitude a that is normal
-or flat in an interval. An effect that is linear in its amplitude has an atom for each
-point of its shape parameters and width of its prior; a nonlinear one has an atom, the
-chord, for each shape point and amplitude cell. A space is a set of columns of which all
-coefficients have one prior sd: effects with several amplitudes, members that differ,
-and kernels of the remainder.
+An effect that is linear in its amplitude has an atom for each point of its shape
+parameters and width of its prior; a nonlinear one has an atom, the chord, for each
+shape point and amplitude cell. Effects with several amplitudes and members that differ
+are spaces.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from scipy.special import erf
 
 from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import curves_on_runs, effect_curves
+from hdcal.evidence.items import STEPS, Amplitudes, Atoms, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
-    FINE,
     SCALE_WEIGHTS,
     SCALES,
     ParameterGrid,
@@ -30,89 +27,46 @@ from hdcal.evidence.parameter_grid import (
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.scatter import Scatter, scores
 
-# Factors on the prior sd of a space whose size is unknown, and its most columns.
-STEPS = 2.0 ** np.arange(-5.0, 5.0)
-MOST_COLUMNS = 24
+# Columns that must be measured for a need of an effect. The other needs (unloading,
+# cycles, …) are features of the loading: without them an effect has a prediction, but
+# may look like another one.
+_COLUMNS = {
+    "temperature": "temperature",
+    "time": "time",
+    "rates": "time",
+    "holds or rates": "time",
+    "angle": "angle",
+    "runs": "run",
+    "specimens": "specimen",
+    "bare_rig": "bare_rig",
+}
 # Relative deviation from proportionality from which an effect is nonlinear.
 _NONLINEAR = 1e-6
+_ROOT_2PI = float(np.sqrt(2.0 * np.pi))
 
 
-class Amplitudes(NamedTuple):
-    """Priors of the amplitudes of atoms, each of shape (m,).
-
-    The density is exp(log_height − precision · (a − mean)² / 2) from low to high.
-
-    Attributes:
-        low: least amplitude.
-        high: largest amplitude.
-        mean: centre of the normal.
-        precision: of the normal; 0 where the density is flat.
-        log_height: log density at the centre.
-    """
-
-    low: Float[np.ndarray, " m"]
-    high: Float[np.ndarray, " m"]
-    mean: Float[np.ndarray, " m"]
-    precision: Float[np.ndarray, " m"]
-    log_height: Float[np.ndarray, " m"]
-
-
-class Atoms(NamedTuple):
-    """Atoms of all effects.
+@dataclass(frozen=True)
+class Predicting:
+    """Effects of a library by whether they predict something for the rows.
 
     Attributes:
-        owner: index of the effect, shape (m,).
-        shape: index of the point of its shape parameters, shape (m,).
-        curve: index of its curve, shape (m,).
-        amplitude: priors of the amplitudes.
-        log_weight: log prior probability of each atom of its effect, shape (m,).
-        offset: contribution of each curve at amplitude 0 [N], shape (c, n).
-        slope: contribution per unit of the amplitude [N], shape (c, n).
+        effects: those that do, by name.
+        lacking: columns that each of the others needs and that were not measured.
     """
 
-    owner: Int[np.ndarray, " m"]
-    shape: Int[np.ndarray, " m"]
-    curve: Int[np.ndarray, " m"]
-    amplitude: Amplitudes
-    log_weight: Float[np.ndarray, " m"]
-    offset: Float[np.ndarray, "c n"]
-    slope: Float[np.ndarray, "c n"]
-
-    def pick(self, index: Int[np.ndarray, " k"]) -> "Atoms":
-        """Return some of the atoms, each with a curve of its own."""
-        own, curve = np.arange(len(index)), self.curve[index]
-        return Atoms(
-            self.owner[index],
-            self.shape[index],
-            own,
-            Amplitudes(*(column[index] for column in self.amplitude)),
-            self.log_weight[index],
-            self.offset[curve],
-            self.slope[curve],
-        )
-
-    def bounded(self, size: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """Return amplitudes moved to the nearest possible ones."""
-        return np.clip(size, self.amplitude.low, self.amplitude.high)
+    effects: dict[str, type[Effect]]
+    lacking: dict[str, list[str]]
 
 
-class Space(NamedTuple):
-    """Columns whose coefficients have one prior sd, on a grid of it.
-
-    Attributes:
-        owner: index of the component.
-        columns: contribution per unit of each coefficient [N], shape (j, n).
-        scale: values of the prior sd, shape (t,).
-        log_weight: log prior probability of each, shape (t,).
-        shape: index of the point of the shape parameters of an effect with several
-            amplitudes; −1 of the others.
-    """
-
-    owner: int
-    columns: Float[np.ndarray, "j n"]
-    scale: Float[np.ndarray, " t"]
-    log_weight: Float[np.ndarray, " t"]
-    shape: int = -1
+def predicting(library: Mapping[str, type[Effect]], records: Records) -> Predicting:
+    """Sort the effects of a library by whether they predict something for the rows."""
+    known, lacking = records.known, {}
+    for name, effect in library.items():
+        columns = {_COLUMNS[n] for n in effect.needs - known if n in _COLUMNS} - known
+        if columns:
+            lacking[name] = sorted(columns)
+    effects = {n: effect for n, effect in library.items() if n not in lacking}
+    return Predicting(effects, lacking)
 
 
 @dataclass(frozen=True)
@@ -121,13 +75,46 @@ class Components:
 
     Attributes:
         names: of the effects.
-        atoms: of those with one amplitude.
+        grids: parameter values of each effect; None of members that differ.
+        atoms: of the effects with one amplitude.
         spaces: of the others.
     """
 
     names: tuple[str, ...]
+    grids: tuple[ParameterGrid | None, ...]
     atoms: Atoms
     spaces: tuple[Space, ...]
+
+    def on_runs(
+        self, problem: LinearProblem, owner: int, item: Atoms | Space, runs: Records
+    ) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, "r j n"]]:
+        """Return offset and columns of an item on other rows [N].
+
+        Args:
+            problem: that the item was made of.
+            owner: index of its effect.
+            item: a space, or a single atom.
+            runs: the other rows, several records of shape (r, n).
+        """
+        grid = self.grids[owner]
+        if grid is None:
+            # The deviation of a new member is unknown.
+            assert isinstance(item, Space)
+            shape = len(runs.force), len(item.columns), runs.force.shape[1]
+            return np.zeros(runs.force.shape), np.zeros(shape)
+        about = problem.base, runs, problem.reading
+        if isinstance(item, Space):
+            values = grid.at(grid.sd * np.eye(len(grid.amplitudes)), item.shape)
+            return np.zeros(runs.force.shape), curves_on_runs(
+                grid.effect, values, *about
+            )
+        linear = float(item.amplitude.precision[0]) > 0.0
+        low, high = item.amplitude.low[0], item.amplitude.high[0]
+        ends = np.array([0.0, grid.unit] if linear else [low, high])
+        values = grid.at(ends, int(item.shape[0]))
+        found = curves_on_runs(grid.effect, values, *about)
+        slope = (found[:, 1] - found[:, 0]) / (ends[1] - ends[0])
+        return found[:, 0] - slope * ends[0], slope[:, None]
 
 
 def components(
@@ -135,79 +122,64 @@ def components(
 ) -> Components:
     """Return atoms and spaces of the effects on the mean reading."""
     names = tuple(n for n, effect in effects.items() if effect.stage != "noise")
-    none = np.zeros(0)
-    nothing = Amplitudes(none, none, none, none, none)
-    rows = np.zeros((0, len(problem.y)))
-    index = none.astype(int)
+    none, rows = np.zeros(0), np.zeros((0, len(problem.y)))
+    index, nothing = none.astype(int), Amplitudes(*5 * [none])
     atoms = [Atoms(index, index, index, nothing, none, rows, rows)]
     spaces: list[Space] = []
+    grids: list[ParameterGrid | None] = []
     for owner, effect in enumerate(effects[name] for name in names):
         if issubclass(effect, Scatter):
+            grids.append(None)
             spaces.append(_members(owner, effect, problem))
             continue
-        grid = make_grid(effect, problem.priors, FINE)
+        grid = make_grid(effect, problem.priors)
         if len(grid.amplitudes) > 1:
-            spaces += _several_amplitudes(owner, effect, problem)
+            grid = make_grid(effect, problem.priors, "subspace")
+            spaces += _several_amplitudes(owner, grid, problem)
         else:
-            found = _one_amplitude(owner, grid, problem)
+            grid, found = _one_amplitude(owner, grid, problem)
             before = sum(len(each.slope) for each in atoms)
             atoms.append(found._replace(curve=before + found.curve))
+        grids.append(grid)
     together = jax.tree.map(lambda *leaves: np.concatenate(leaves), *atoms)
-    return Components(names, together, tuple(spaces))
+    return Components(names, tuple(grids), together, tuple(spaces))
 
 
-def principal(columns: Float[np.ndarray, "k n"], most: int = MOST_COLUMNS):
-    """Return at most so many columns with nearly the same covariance, shape (j, n)."""
-    if len(columns) <= most:
-        return columns
-    return np.linalg.eigh(columns @ columns.T)[1][:, -most:].T @ columns
-
-
-def _curves(effect: type[Effect], problem: LinearProblem, values: dict):
+def _curves(effect: type[Effect], values: dict, problem: LinearProblem):
     found = effect_curves(effect, values, problem.base, problem.padded, problem.reading)
     return found[:, : len(problem.y)]
 
 
-def _table(grid: ParameterGrid, problem: LinearProblem, amplitudes):
-    """Return curves at all shape points and amplitudes, shape (s, a, n)."""
-    count = len(amplitudes)
-    values = {name: np.repeat(value, count) for name, value in grid.shapes.items()}
-    values[grid.amplitudes[0]] = np.tile(amplitudes, grid.size)
-    found = _curves(grid.effect, problem, values)
-    return found.reshape(grid.size, count, -1)
-
-
-def _one_amplitude(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atoms:
-    unit = grid.mean + 2.0 * grid.sd
-    table = _table(grid, problem, np.array([unit, unit / 2.0]))
+def _one_amplitude(
+    owner: int, grid: ParameterGrid, problem: LinearProblem
+) -> tuple[ParameterGrid, Atoms]:
+    """Return the atoms of an effect with one amplitude, and the grid that they use."""
+    ends = np.array([grid.unit, grid.unit / 2.0])
+    table = _curves(grid.effect, grid.at(ends), problem).reshape(grid.size, 2, -1)
     deviation = np.max(np.abs(table[:, 0] - 2.0 * table[:, 1]))
     if grid.normal and deviation <= _NONLINEAR * np.max(np.abs(table)):
-        return _linear_atoms(owner, grid, table[:, 0] / unit)
-    cells = make_grid(grid.effect, problem.priors, FINE, "cells")
-    return _cell_atoms(owner, cells, problem)
-
-
-def _widths(grid: ParameterGrid) -> tuple[np.ndarray, np.ndarray]:
-    """Return factors on the prior sd of an amplitude, and their probabilities."""
-    return (SCALES, SCALE_WEIGHTS) if grid.centred else (np.ones(1), np.ones(1))
+        return grid, _linear_atoms(owner, grid, table[:, 0] / grid.unit)
+    cells = make_grid(grid.effect, problem.priors, "cells")
+    return cells, _cell_atoms(owner, cells, problem)
 
 
 def _linear_atoms(
     owner: int, grid: ParameterGrid, slope: Float[np.ndarray, "s n"]
 ) -> Atoms:
-    scales, weights = _widths(grid)
+    scales, weights = grid.widths
     sds = np.tile(grid.sd * scales, len(slope))
     sides, same = 2.0 if grid.one_sided else 1.0, np.ones(len(sds))
+    point = np.repeat(np.arange(grid.size), len(scales))
     return Atoms(
         owner=np.full(len(sds), owner),
-        shape=np.repeat(np.arange(grid.size), len(scales)),
-        curve=np.repeat(np.arange(grid.size), len(scales)),
+        shape=point,
+        curve=point,
         amplitude=Amplitudes(
             low=(0.0 if grid.one_sided else -np.inf) * same,
             high=np.inf * same,
             mean=grid.mean * same,
             precision=sds**-2.0,
-            log_height=np.log(sides / (sds * np.sqrt(2.0 * np.pi))),
+            log_height=np.log(sides / (sds * _ROOT_2PI)),
         ),
         log_weight=np.tile(np.log(weights), grid.size) - np.log(grid.size),
         offset=np.zeros_like(slope),
@@ -216,12 +188,12 @@ def _linear_atoms(
 
 
 def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atoms:
-    edges = grid.edges
-    table, width = _table(grid, problem, edges), np.diff(edges)
+    edges, mass = grid.cells()
+    table = _curves(grid.effect, grid.at(edges), problem)
+    table, width = table.reshape(grid.size, len(edges), -1), np.diff(edges)
     slope = np.diff(table, axis=1) / width[:, None]
     offset = table[:, :-1] - slope * edges[:-1, None]
-    log_height = np.tile(np.log(_cell_mass(grid) / width), grid.size)
-    none = np.zeros(len(log_height))
+    none = np.zeros(grid.size * len(width))
     return Atoms(
         owner=np.full(len(none), owner),
         shape=np.repeat(np.arange(grid.size), len(width)),
@@ -231,7 +203,7 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
             high=np.tile(edges[1:], grid.size),
             mean=none,
             precision=none,
-            log_height=log_height,
+            log_height=np.tile(np.log(mass / width), grid.size),
         ),
         log_weight=none - np.log(grid.size),
         offset=offset.reshape(len(none), -1),
@@ -239,30 +211,16 @@ def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atom
     )
 
 
-def _cell_mass(grid: ParameterGrid) -> Float[np.ndarray, " c"]:
-    """Return the prior probability of each amplitude cell."""
-    if not grid.normal:
-        return np.maximum(grid.mass, 1e-300)
-    scales, weights = _widths(grid)
-    steps = (grid.edges - grid.mean) / grid.sd
-    below = 0.5 * erf(steps[:, None] / (np.sqrt(2.0) * scales)) @ weights
-    return np.maximum((2.0 if grid.one_sided else 1.0) * np.diff(below), 1e-300)
-
-
 def _several_amplitudes(
-    owner: int, effect: type[Effect], problem: LinearProblem
+    owner: int, grid: ParameterGrid, problem: LinearProblem
 ) -> list[Space]:
     """Return a space for each shape point of an effect with several amplitudes."""
-    grid = make_grid(effect, problem.priors, kind="subspace")
+    count = len(grid.amplitudes)
+    table = _curves(grid.effect, grid.at(grid.sd * np.eye(count)), problem)
+    table = table.reshape(grid.size, count, -1)
     shown = np.flatnonzero(_shown(grid, problem))
-    shapes = {name: values[shown] for name, values in grid.shapes.items()}
-    table = _curves(effect, problem, grid.one_amplitude_each(shapes))
-    table = table.reshape(len(shown), len(grid.amplitudes), -1)
-    weights = np.log(SCALE_WEIGHTS) - np.log(len(table))
-    return [
-        Space(owner, columns, SCALES, weights, int(shape))
-        for shape, columns in zip(shown, table, strict=True)
-    ]
+    weights = np.log(SCALE_WEIGHTS) - np.log(len(shown))
+    return [Space(owner, table[k], SCALES, weights, int(k)) for k in shown]
 
 
 def _shown(grid: ParameterGrid, problem: LinearProblem) -> Bool[np.ndarray, " s"]:
@@ -283,50 +241,10 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     label = np.asarray(getattr(problem.records, effect.members))
     padded = getattr(problem.padded, effect.members)
     score = np.asarray(scores(padded))[: len(label)]
-    added = _curves(effect, problem, {"sd": np.ones(1)})[0] / score
+    added = _curves(effect, {"sd": np.ones(1)}, problem)[0] / score
     columns = added * (label == np.unique(label)[:, None])
     sd = make_grid(effect, problem.priors).sd
     edges = np.concatenate([[0.0], np.sqrt(STEPS[1:] * STEPS[:-1]), [np.inf]])
     below = erf(edges[:, None] / (np.sqrt(2.0) * SCALES)) @ SCALE_WEIGHTS
     log_mass = np.log(np.maximum(np.diff(below), 1e-300))
     return Space(owner, principal(columns), sd * STEPS, log_mass)
-
-
-def atom_on_runs(
-    effect: type[Effect], problem: LinearProblem, atom: Atoms, runs: Records
-) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, "r n"]]:
-    """Return offset and slope of one atom on other rows than it was made of [N].
-
-    Args:
-        effect: of the atom.
-        problem: that the atom was made of.
-        atom: a single one.
-        runs: the other rows, several times as many, of shape (r, n).
-    """
-    shape, amplitude = int(atom.shape[0]), atom.amplitude
-    linear = float(amplitude.precision[0]) > 0.0
-    grid = make_grid(effect, problem.priors, FINE, "linear" if linear else "cells")
-    unit = grid.mean + 2.0 * grid.sd
-    ends = (0.0, unit) if linear else (amplitude.low[0], amplitude.high[0])
-    values = {name: np.full(2, each[shape]) for name, each in grid.shapes.items()}
-    values[grid.amplitudes[0]] = np.array(ends)
-    found = curves_on_runs(effect, values, problem.base, runs, problem.reading)
-    slope = (found[:, 1] - found[:, 0]) / (ends[1] - ends[0])
-    return found[:, 0] - slope * ends[0], slope
-
-
-def space_on_runs(
-    effect: type[Effect], problem: LinearProblem, shape: int, runs: Records
-) -> Float[np.ndarray, "r j n"]:
-    """Return the columns of an effect with several amplitudes on other rows [N].
-
-    Args:
-        effect: with several amplitudes.
-        problem: that its space was made of.
-        shape: index of the point of its shape parameters.
-        runs: the other rows, several times as many, of shape (r, n).
-    """
-    grid = make_grid(effect, problem.priors, kind="subspace")
-    shapes = {name: values[[shape]] for name, values in grid.shapes.items()}
-    values = grid.one_amplitude_each(shapes)
-    return curves_on_runs(effect, values, problem.base, runs, problem.reading)

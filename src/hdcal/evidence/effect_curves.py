@@ -1,4 +1,4 @@
-"""What an effect adds to the mean reading, at many values of its parameters."""
+"""Contributions of effects to the mean reading, at many values of their parameters."""
 
 from dataclasses import replace
 
@@ -21,8 +21,8 @@ _RUNS = 11
 def padded_records(records: Records) -> Records:
     """Return records of a length that many cases share.
 
-    What is known of them is left out: it would compile everything anew, and only what
-    an effect `needs` hangs on it.
+    `known` is left out: everything would be compiled anew for it, and only the `needs`
+    of effects depend on it.
     """
     return pad_records(replace(records, known=frozenset()))
 
@@ -65,10 +65,10 @@ def effect_curves(
     table = {name: np.asarray(column, float) for name, column in values.items()}
     count = len(next(iter(table.values())))
     table = repeat_last_row(table, count + -count % block)
-    parts = [
-        np.asarray(_curves(effect(**_rows(table, i, block)), base, padded, reading))
-        for i in range(0, count, block)
-    ]
+    parts = []
+    for start in range(0, count, block):
+        some = {name: column[start : start + block] for name, column in table.items()}
+        parts.append(np.asarray(_curves(effect(**some), base, padded, reading)))
     return np.concatenate(parts)[:count]
 
 
@@ -92,16 +92,9 @@ def curves_on_runs(
         Shape (r, g, n).
     """
     count, rows = runs.force.shape
-    same = replace(runs, known=frozenset())
+    width = [(0, _RUNS - count), (0, bucket_size(rows) - rows)]
     padded = jax.tree.map(
-        lambda column: np.pad(
-            column, [(0, _RUNS - count), (0, bucket_size(rows) - rows)], "edge"
-        ),
-        same,
+        lambda column: np.pad(column, width, "edge"), replace(runs, known=frozenset())
     )
     found = _curves_on_runs(effect(**values), base, padded, reading)
     return np.asarray(found)[:count, :, :rows]
-
-
-def _rows(table: dict[str, np.ndarray], start: int, count: int):
-    return {name: column[start : start + count] for name, column in table.items()}

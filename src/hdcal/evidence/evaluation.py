@@ -1,18 +1,19 @@
-"""Evidence of all items beside a context, under one model of the noise."""
+"""Evidence of all items given a context, under one model of the noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeVar
 
+import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.evidence.components import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
+from hdcal.evidence.components import Components
+from hdcal.evidence.items import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.evidence.marginal import Items, Products, log_marginal
+from hdcal.evidence.marginal import Marginal
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context, Part, Place
-from hdcal.evidence.projection import Projection
+from hdcal.evidence.projection import Block, Projection
 
 # Relative sds by which a shape may deviate from the library's, and their probabilities.
 _TOLERANCES = np.array([0.0, 0.1, 0.2])
@@ -21,74 +22,13 @@ _TOLERANCE_WEIGHTS = np.array([0.4, 0.3, 0.3])
 _NARROW = 4
 # Models of the noise whose whitened curves are kept: those of pairs.
 _KEPT = 2
-
-
-class _Spaces(NamedTuple):
-    """Spaces padded to one width; scales of zero weight fill shorter grids.
-
-    Attributes:
-        owner: index of the component, shape (s,).
-        columns: shape (s, j, n); whitened for a model of the noise.
-        gram: their inner products, shape (s, j, j).
-        scale: shape (s, t).
-        log_weight: shape (s, t).
-    """
-
-    owner: Int[np.ndarray, " s"]
-    columns: Float[np.ndarray, "s j n"]
-    gram: Float[np.ndarray, "s j j"]
-    scale: Float[np.ndarray, "s t"]
-    log_weight: Float[np.ndarray, "s t"]
-
-
-class _Atoms(NamedTuple):
-    """Whitened curves of atoms, and products of the columns of their tolerance.
-
-    Attributes:
-        offset: shape (m, n).
-        slope: shape (m, n).
-        loose: columns of the tolerance, shape (m, l, n).
-        gram: of these with each other, shape (m, l, l).
-        with_offset: of these with the offset, shape (m, l).
-        with_slope: of these with the slope, shape (m, l).
-    """
-
-    offset: Float[np.ndarray, "m n"]
-    slope: Float[np.ndarray, "m n"]
-    loose: Float[np.ndarray, "m l n"]
-    gram: Float[np.ndarray, "m l l"]
-    with_offset: Float[np.ndarray, "m l"]
-    with_slope: Float[np.ndarray, "m l"]
-
-
-Rows = TypeVar("Rows", _Spaces, _Atoms)
-
-
-def _pick(table: Rows, rows) -> Rows:
-    return type(table)(*(column[rows] for column in table))
-
-
-def _gram(columns: Float[np.ndarray, "s j n"]) -> Float[np.ndarray, "s j j"]:
-    return columns @ np.swapaxes(columns, 1, 2)
-
-
-def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> _Spaces:
-    """Return spaces of at most so many columns, whitened."""
-    count, points = len(spaces), len(STEPS)
-    columns = np.zeros((count, width, len(projection.y)))
-    scale, log_weight = np.ones((count, points)), np.full((count, points), -np.inf)
-    for k, space in enumerate(spaces):
-        columns[k, : len(space.columns)] = space.columns
-        scale[k, : len(space.scale)] = space.scale
-        log_weight[k, : len(space.scale)] = space.log_weight
-    owner = np.array([space.owner for space in spaces], int)
-    white = projection.whiten(columns)
-    return _Spaces(owner, white, _gram(white), scale, log_weight)
+# Atoms of each effect that are evaluated given tolerances and contexts.
+_CHOSEN = 8
 
 
 @dataclass
 class Selection:
-    """Atoms and spaces that are compared beside every context.
+    """Atoms and spaces that are compared given every context.
 
     Attributes:
         problem: the case.
@@ -103,15 +43,12 @@ class Selection:
     tolerance: Float[np.ndarray, "m l n"]
     spaces: tuple[Space, ...]
     names: tuple[str, ...]
-    _white: dict[tuple, tuple[_Atoms, _Spaces, _Spaces]] = field(
+    _white: dict[tuple, tuple[Block, Block, Block]] = field(
         init=False, default_factory=dict
     )
 
     def __post_init__(self) -> None:
-        narrow = [space for space in self.spaces if len(space.columns) <= _NARROW]
-        wide = [space for space in self.spaces if len(space.columns) > _NARROW]
-        self.spaces = (*wide, *narrow)
-        self._wide = len(wide)
+        self.spaces = tuple(sorted(self.spaces, key=_is_narrow))
 
     def evaluate(
         self,
@@ -130,106 +67,70 @@ class Selection:
         """
         projection = Projection(self.problem, noise, context)
         atoms, wide, narrow = self._whitened(projection)
-        empty = np.zeros((0, len(projection.y)))
+        empty = np.zeros((0, len(self.problem.y)))
         nothing = Space(-1, empty, np.ones(1), np.zeros(1))
         more = _padded([*extra, nothing], _NARROW, projection)
-        narrow = _Spaces(*map(np.concatenate, zip(narrow, more, strict=True)))
-        spaces = np.concatenate(
-            [_of_spaces(projection, each, only) for each in (wide, narrow)]
-        )
+        narrow = jax.tree.map(lambda *parts: np.concatenate(parts), narrow, more)
+        tables = (projection.evaluate(each, only)[0] for each in (wide, narrow))
+        spaces = np.concatenate([*tables])
         return Evaluated(
             selection=self,
             none=float(spaces[-1, 0]),
-            atoms=self._of_atoms(projection, atoms, only),
+            atoms=projection.evaluate(atoms, only),
             spaces=spaces[:-1],
             space_owner=np.concatenate([wide.owner, narrow.owner])[:-1],
             extra=tuple(extra),
         )
 
-    def _whitened(self, projection: Projection) -> tuple[_Atoms, _Spaces, _Spaces]:
+    def _whitened(self, projection: Projection) -> tuple[Block, Block, Block]:
         """Return what does not depend on the context, kept for the last models."""
         noise = projection.noise
         key = noise.name, noise.correlation, noise.weight.tobytes()
         if key not in self._white:
-            whiten = projection.whiten
-            offset, slope = whiten(self.atoms.offset), whiten(self.atoms.slope)
-            loose = whiten(self.tolerance)
-            products = (loose @ each[..., None] for each in (offset, slope))
-            along = (each[..., 0] for each in products)
-            wide, narrow = self.spaces[: self._wide], self.spaces[self._wide :]
+            atoms, shape = self.atoms, (len(self.atoms.owner), len(_TOLERANCES))
+            narrow = [space for space in self.spaces if _is_narrow(space)]
+            wide = self.spaces[: len(self.spaces) - len(narrow)]
             self._white[key] = (
-                _Atoms(offset, slope, loose, _gram(loose), *along),
+                projection.block(
+                    atoms.owner,
+                    atoms.amplitude,
+                    np.broadcast_to(_TOLERANCES**2, shape),
+                    atoms.log_weight[:, None] + np.log(_TOLERANCE_WEIGHTS),
+                    *(atoms.offset, atoms.slope, self.tolerance),
+                ),
                 _padded(wide, MOST_COLUMNS, projection),
                 _padded(narrow, _NARROW, projection),
             )
         self._white = dict([*self._white.items()][-_KEPT:])
         return self._white[key]
 
-    def _of_atoms(
-        self, projection: Projection, white: _Atoms, only: set[int] | None
-    ) -> Items:
-        rows = _rows(self.atoms.owner, only)
-        white = _pick(white, rows)
-        curves = projection.curves(white.offset, white.slope)
-        axes = projection.axes(white.loose, white.gram)
-        te = axes.products(axes.along_y - white.with_offset, curves.error_q)
-        tu = axes.products(white.with_slope, curves.slope_q)
-        found = log_marginal(
-            self.problem.count,
-            Products(*curves[:3], te, tu, axes.square),
-            np.broadcast_to(_TOLERANCES**2, (len(te), len(_TOLERANCES))),
-            Amplitudes(*(column[rows] for column in self.atoms.amplitude)),
-            self.problem.noise_prior,
-        )
-        weight = self.atoms.log_weight[rows, None] + np.log(_TOLERANCE_WEIGHTS)
-        log_evidence = found.log_evidence + weight + projection.constant
-        found = found._replace(log_evidence=log_evidence)
-        if only is None:
-            return found
-        shape = len(self.atoms.owner), len(_TOLERANCES)
-        return Items(*(_spread(each, rows, shape) for each in found))
+
+def _is_narrow(space: Space) -> bool:
+    return len(space.columns) <= _NARROW
 
 
-def _rows(owner: Int[np.ndarray, " m"], only: set[int] | None):
-    """Return the items of some components; of all by default."""
-    return slice(None) if only is None else np.flatnonzero(np.isin(owner, [*only]))
-
-
-def _spread(values, rows, shape: tuple[int, int]) -> Float[np.ndarray, "m t"]:
-    """Return a table with values in some rows and no evidence in the others."""
-    table = np.full(shape, -np.inf)
-    table[rows] = values
-    return table
-
-
-def _of_spaces(
-    projection: Projection, spaces: _Spaces, only: set[int] | None
-) -> Float[np.ndarray, "s t"]:
-    """Return the log evidence of spaces at each scale."""
-    rows = _rows(spaces.owner, None if only is None else {*only, -1})
-    picked = _pick(spaces, rows)
-    count, problem = len(picked.owner), projection.problem
-    axes = projection.axes(picked.columns, picked.gram)
-    base = np.broadcast_to(projection.y_q, (count, len(projection.y_q)))
-    none, no_axes = np.zeros(count), np.zeros_like(axes.square)
-    products = Products(
-        np.full(count, projection.square),
-        none,
-        none,
-        axes.products(axes.along_y, base),
-        no_axes,
-        axes.square,
-    )
-    found = log_marginal(
-        problem.count, products, picked.scale**2, None, problem.noise_prior
-    )
-    log_evidence = found.log_evidence + picked.log_weight + projection.constant
-    return _spread(log_evidence, rows, spaces.scale.shape)
+def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> Block:
+    """Return spaces of at most so many columns; padded scales have no weight."""
+    count, rows = len(spaces), len(projection.problem.y)
+    columns = np.zeros((count, width, rows))
+    scale = np.ones((count, len(STEPS)))
+    log_weight = np.full_like(scale, -np.inf)
+    for k, space in enumerate(spaces):
+        columns[k, : len(space.columns)] = space.columns
+        scale[k, : len(space.scale)] = space.scale
+        log_weight[k, : len(space.scale)] = space.log_weight
+    # A slope of zero with a normal amplitude changes no evidence.
+    none, one, no_curve = np.zeros(count), np.ones(count), np.zeros((count, rows))
+    height = np.full(count, -0.5 * np.log(2.0 * np.pi))
+    amplitude = Amplitudes(-np.inf * one, np.inf * one, none, one, height)
+    owner = np.array([space.owner for space in spaces], int)
+    curves = no_curve, no_curve, columns
+    return projection.block(owner, amplitude, scale**2, log_weight, *curves)
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Evidence of all items beside one context.
+    """Evidence of all items given one context.
 
     Attributes:
         selection: the items.
@@ -242,10 +143,17 @@ class Evaluated:
 
     selection: Selection
     none: float
-    atoms: Items
+    atoms: Marginal
     spaces: Float[np.ndarray, "s t"]
     space_owner: Int[np.ndarray, " s"]
     extra: tuple[Space, ...]
+
+    def _table(self, component: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the log evidence of the items among which a component's are."""
+        owner = self.selection.atoms.owner
+        if np.any(owner == component):
+            return self.atoms.log_evidence, owner
+        return self.spaces, self.space_owner
 
     def totals(self) -> Float[np.ndarray, " k"]:
         """Return the log evidence of each component."""
@@ -260,23 +168,27 @@ class Evaluated:
 
     def of_part(self, part: Part) -> float:
         """Return the log evidence of a part that was found elsewhere."""
-        atomic = np.any(self.selection.atoms.owner == part.component)
-        table = self.atoms.log_evidence if atomic else self.spaces
-        return float(table[part.place]) + part.spread
+        return float(self._table(part.component)[0][part.place]) + part.spread
 
     def likeliest(self, component: int) -> Part:
         """Return a component at its most probable item."""
-        if np.any(self.selection.atoms.owner == component):
-            return self._likeliest_atom(component)
-        return self._likeliest_space(component)
+        table, owner = self._table(component)
+        members = np.flatnonzero(owner == component)
+        some = table[members]
+        row, column = np.unravel_index(np.argmax(some), some.shape)
+        spread = float(np.logaddexp.reduce(some, axis=None) - some.max())
+        place = Place(int(members[row]), int(column))
+        if table is self.spaces:
+            space = [*self.selection.spaces, *self.extra][place.row]
+            return _space_part(space, place, spread)
+        return self._atom_part(component, place, spread)
 
-    def _likeliest_atom(self, component: int) -> Part:
+    def _atom_part(self, component: int, place: Place, spread: float) -> Part:
         selection = self.selection
-        members = np.flatnonzero(selection.atoms.owner == component)
-        place, spread = _largest(self.atoms.log_evidence, members)
         atom = selection.atoms.pick(np.array([place.row]))
         size = atom.bounded(self.atoms.mean[place][None])
-        low = selection.atoms.amplitude.low[members]
+        of_component = selection.atoms.owner == component
+        low = selection.atoms.amplitude.low[of_component]
         log_chance = self.atoms.log_evidence[place.row]
         chance = np.exp(log_chance - np.logaddexp.reduce(log_chance))
         loose = _TOLERANCES[:, None, None] * selection.tolerance[place.row]
@@ -294,29 +206,63 @@ class Evaluated:
             levels=levels,
         )
 
-    def _likeliest_space(self, component: int) -> Part:
-        members = np.flatnonzero(self.space_owner == component)
-        place, spread = _largest(self.spaces, members)
-        space = [*self.selection.spaces, *self.extra][place.row]
-        count, rows = space.columns.shape
-        fixed = np.zeros((0, rows))
-        return Part(
-            component=component,
-            offset=np.zeros(rows),
-            columns=space.columns,
-            mean=np.zeros(count),
-            sd=np.full(count, space.scale[place.column]),
-            loose=fixed,
-            one_sided=False,
-            place=place,
-            spread=spread,
-            levels=((1.0, fixed),),
-        )
+
+def _space_part(space: Space, place: Place, spread: float) -> Part:
+    count, rows = space.columns.shape
+    fixed = np.zeros((0, rows))
+    return Part(
+        component=space.owner,
+        offset=np.zeros(rows),
+        columns=space.columns,
+        mean=np.zeros(count),
+        sd=np.full(count, space.scale[place.column]),
+        loose=fixed,
+        one_sided=False,
+        place=place,
+        spread=spread,
+        levels=((1.0, fixed),),
+    )
 
 
-def _largest(log_evidence, members) -> tuple[Place, float]:
-    """Return the place of the largest of some rows, and the log sum of all above it."""
-    table = log_evidence[members]
-    row, column = np.unravel_index(np.argmax(table), table.shape)
-    spread = float(np.logaddexp.reduce(table, axis=None) - table.max())
-    return Place(int(members[row]), int(column)), spread
+def select(
+    problem: LinearProblem,
+    noises: Sequence[NoiseModel],
+    effects: Components,
+    kernels: Sequence[Space],
+    names: tuple[str, ...],
+) -> Selection:
+    """Return the most probable atoms of each effect, with the weight of all of them.
+
+    Args:
+        problem: the case.
+        noises: models of the noise over which atoms are compared.
+        effects: of the library.
+        kernels: of the remainder.
+        names: of all components, the remainder last.
+    """
+    atoms, spaces = effects.atoms, (*effects.spaces, *kernels)
+    if not len(atoms.owner):
+        tolerance = np.zeros((0, *problem.tolerance.shape))
+        return Selection(problem, atoms, tolerance, spaces, names)
+    none = Context(np.zeros(len(problem.y)), np.zeros((0, len(problem.y))))
+    curves = atoms.offset, atoms.slope, atoms.curve, atoms.amplitude
+    found = [
+        Projection(problem, each, none).evaluate_curves(*curves) for each in noises
+    ]
+    table = np.stack([each.log_evidence[:, 0] for each in found]) + atoms.log_weight
+    sizes = np.stack([atoms.bounded(each.mean[:, 0]) for each in found])
+    size = np.take_along_axis(sizes, np.argmax(table, axis=0)[None], axis=0)[0]
+    whole = np.logaddexp.reduce(table, axis=0)
+    chosen, rest = [], []
+    for owner in np.unique(atoms.owner):
+        members = np.flatnonzero(atoms.owner == owner)
+        best = members[np.argsort(-whole[members], kind="stable")[:_CHOSEN]]
+        more = np.logaddexp.reduce(whole[members]) - np.logaddexp.reduce(whole[best])
+        chosen.append(best)
+        rest.append(np.full(len(best), more))
+    index = np.concatenate(chosen)
+    picked = atoms.pick(index)
+    picked = picked._replace(log_weight=picked.log_weight + np.concatenate(rest))
+    shape = problem.project(picked.offset + size[index, None] * picked.slope)
+    tolerance = shape[:, None] * problem.tolerance
+    return Selection(problem, picked, tolerance, spaces, names)

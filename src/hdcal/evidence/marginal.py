@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from hdcal.evidence.components import Amplitudes
+from hdcal.evidence.items import Amplitudes
 from hdcal.inference.likelihood import log_interval
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
@@ -25,12 +25,12 @@ _STEPS = 3
 
 
 class Products(NamedTuple):
-    """Inner products of items in whitened rows, beside the base.
+    """Inner products of items in whitened rows, less what the base explains.
 
     Attributes:
         ee: of the error, the readings less o, with itself, shape (m,).
-        eu: of error and slope, shape (m,); zeros for items without one.
-        uu: of the slope with itself, likewise.
+        eu: of error and slope, shape (m,).
+        uu: of the slope with itself, shape (m,).
         te: of each principal axis of L with the error, shape (m, j).
         tu: of each axis with the slope, shape (m, j).
         square: squared length of each axis, shape (m, j).
@@ -44,7 +44,7 @@ class Products(NamedTuple):
     square: Float[np.ndarray, "m j"]
 
 
-class Items(NamedTuple):
+class Marginal(NamedTuple):
     """Evaluated items, each of shape (m, t).
 
     Attributes:
@@ -59,7 +59,7 @@ class Items(NamedTuple):
 
 
 class _Given(NamedTuple):
-    """What is left at a noise variance when the loose columns are integrated out.
+    """Products at a noise variance when the loose columns are integrated out.
 
     `used` is the number of rows that they use up.
     """
@@ -86,19 +86,13 @@ class _Loose:
         self._pairs = np.stack([te**2, te * tu, tu**2, products.square], axis=1)
 
     def given(self, noise: Float[np.ndarray, "*k m t"]) -> _Given:
-        """Return what is left at noise variances."""
+        """Return the products at noise variances."""
         inside = noise[..., None] + self.lam
         log_det = np.sum(np.log(inside / noise[..., None]), axis=-1)
         taken = self._pairs @ np.swapaxes(self.variance / inside, -1, -2)
         ee, eu, uu, used = np.moveaxis(taken, -2, 0)
-        products = self.products
-        return _Given(
-            log_det,
-            products.ee[:, None] - ee,
-            products.eu[:, None] - eu,
-            products.uu[:, None] - uu,
-            used,
-        )
+        all_ee, all_eu, all_uu = (each[:, None] for each in self.products[:3])
+        return _Given(log_det, all_ee - ee, all_eu - eu, all_uu - uu, used)
 
 
 class _Amplitude(NamedTuple):
@@ -119,22 +113,21 @@ def log_marginal(
     count: int,
     products: Products,
     variance: Float[np.ndarray, "m t"],
-    prior: Amplitudes | None,
+    prior: Amplitudes,
     sigma: Any,
-) -> Items:
+) -> Marginal:
     """Return the log marginal likelihood of each item.
 
     Args:
         count: number of rows.
         products: inner products of the items.
         variance: prior variances of the coefficients of their loose columns.
-        prior: of their amplitudes, each of shape (m,); None without a slope.
+        prior: of their amplitudes.
         sigma: frozen distribution of the noise sd [N].
     """
     if not products.ee.size:
-        return Items(*3 * [np.zeros(variance.shape)])
-    if prior is not None:
-        prior = Amplitudes(*(column[:, None] for column in prior))
+        return Marginal(*3 * [np.zeros(variance.shape)])
+    prior = Amplitudes(*(column[:, None] for column in prior))
     loose = _Loose(products, variance)
     noise = _likeliest_variance(count, loose, prior)
     centre = 0.5 * np.log(noise)
@@ -149,38 +142,33 @@ def log_marginal(
     value += np.log(_WEIGHTS)[:, None, None] + nodes**2
     log_evidence = np.logaddexp.reduce(value, axis=0)
     log_evidence += 0.5 * np.log(2.0 * width**2) - 0.5 * count * _LOG_2PI
-    if prior is None:
-        none = np.zeros_like(centre)
-        return Items(log_evidence, none, none)
     found = _amplitude(loose.given(noise), noise, prior)
-    return Items(log_evidence, found.mean, found.precision**-0.5)
+    return Marginal(log_evidence, found.mean, found.precision**-0.5)
 
 
-def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes | None):
+def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes):
     """Return the noise variance at which the likelihood is largest, approximately."""
     square = loose.products.ee[:, None]
     variance = np.broadcast_to(square / count, loose.lam.shape[:-1])
     for _ in range(_STEPS):
         given = loose.given(variance)
-        left = given.ee
-        if prior is not None:
-            size = _amplitude(given, variance, prior).mean
-            size = np.clip(size, prior.low, prior.high)
-            left = left - 2.0 * size * given.eu + size**2 * given.uu
+        size = _amplitude(given, variance, prior).mean
+        size = np.clip(size, prior.low, prior.high)
+        left = given.ee - 2.0 * size * given.eu + size**2 * given.uu
         free = np.maximum(count - given.used, 1.0)
         variance = np.maximum(left, 1e-9 * square) / free
     return variance
 
 
-def _log_density(count: int, log_sd, loose: _Loose, prior: Amplitudes | None):
+def _log_density(count: int, log_sd, loose: _Loose, prior: Amplitudes):
     """Return the log density of the readings given the noise sd, less log 2π terms."""
     variance = np.exp(2.0 * log_sd)
     given = loose.given(variance)
-    value = -count * log_sd - 0.5 * given.log_det - 0.5 * given.ee / variance
-    if prior is None:
-        return value
     precision, score, mean = _amplitude(given, variance, prior)
-    root = np.sqrt(precision)
-    mass = log_interval((prior.low - mean) * root, (prior.high - mean) * root)
-    value = value + 0.5 * score * mean - 0.5 * prior.precision * prior.mean**2
+    mass, root = 0.0, np.sqrt(precision)
+    # Amplitudes of spaces have no bounds.
+    if np.any(np.isfinite(prior.low) | np.isfinite(prior.high)):
+        mass = log_interval((prior.low - mean) * root, (prior.high - mean) * root)
+    value = -count * log_sd - 0.5 * given.log_det - 0.5 * given.ee / variance
+    value += 0.5 * score * mean - 0.5 * prior.precision * prior.mean**2
     return value + 0.5 * (_LOG_2PI - np.log(precision)) + mass + prior.log_height

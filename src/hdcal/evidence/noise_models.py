@@ -1,4 +1,4 @@
-"""Models of the noise: equal in all rows, growing with the force, with outliers."""
+"""Models of the noise: equal in all rows, growing with the force, or with outliers."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,13 +8,20 @@ from jaxtyping import Float, Int
 from scipy.special import betaln, entr, expit
 from scipy.stats import binomtest
 
+from hdcal.data.records import Records
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
+from hdcal.evidence.row_features import half_cycle_rows
 from hdcal.inference.distributions import frozen
 
 GROWING, OUTLIERS = "heteroscedastic_noise", "outliers"
 # Prior odds of each effect on the noise, whatever acts on the mean.
 PRIOR_ODDS = 0.02
+# AR(1) coefficients of the noise that are always integrated over.
+_CORRELATIONS = (0.0, 0.2, 0.4, 0.6)
+# Noise may be correlated over a fifth of a half cycle, at most by 0.98; larger
+# coefficients are added where they reach this far at least.
+_SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 # Noise sd of the load alone at the largest force over the noise sd without load.
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
@@ -41,17 +48,28 @@ class NoiseModel(NamedTuple):
     log_prior: float
 
 
+def noise_correlations(records: Records) -> Float[np.ndarray, " r"]:
+    """Return the AR(1) coefficients of the noise that are integrated over.
+
+    Where half cycles have many rows two larger coefficients are added, up to the one
+    whose correlation lasts for a fifth of a half cycle.
+    """
+    longest = min(np.exp(-_SPANS / half_cycle_rows(records)), _LARGEST)
+    if longest < _WORTHWHILE:
+        return np.array(_CORRELATIONS)
+    middle = np.exp(-np.sqrt(np.log(_CORRELATIONS[-1]) * np.log(longest)))
+    return np.array([*_CORRELATIONS, middle, longest])
+
+
 def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
     """Return noise that is equal in all rows, a model for each correlation."""
-    log_prior = -float(np.log(len(problem.correlations)))
-    return [
-        NoiseModel("", problem.weight, float(correlation), log_prior)
-        for correlation in problem.correlations
-    ]
+    correlations = noise_correlations(problem.records)
+    log_prior = -float(np.log(len(correlations)))
+    return [NoiseModel("", problem.weight, float(c), log_prior) for c in correlations]
 
 
 def correlated_noise(
-    problem: LinearProblem, error: Float[np.ndarray, " n"]
+    problem: LinearProblem, error: Float[np.ndarray, " n"], largest: float
 ) -> NoiseModel:
     """Return equal noise with the correlation that errors have.
 
@@ -61,12 +79,13 @@ def correlated_noise(
     Args:
         problem: the case.
         error: of the rows [N], shape (n,).
+        largest: correlation that is allowed.
     """
     follows = problem.before >= 0
     error = error * problem.weight
     last = error[problem.before[follows]]
     found = float(error[follows] @ last / max(last @ last, 1e-300))
-    found = float(np.clip(found, 0.0, problem.correlations[-1]))
+    found = float(np.clip(found, 0.0, largest))
     sd = np.sqrt((1.0 - found**2) / max(np.count_nonzero(follows), 1))
     log_mass = float(np.log(min(np.sqrt(2.0 * np.pi) * sd, 1.0)))
     return NoiseModel("", problem.weight, found, log_mass)
@@ -114,14 +133,14 @@ def outliers(
     """Return the outlier model as weights of rows, by a variational bound.
 
     There is none where wild rows agree with their neighbours: that is structure. The
-    probabilities that rows are wild come from an EM fit. With any such
-    probabilities the evidence of every hypothesis is a lower bound, which is tight
-    where rows are clearly wild or clearly not.
+    probabilities that rows are wild come from an EM fit. With any such probabilities
+    the evidence of every hypothesis is a lower bound, which is tight where rows are
+    clearly wild or clearly not.
 
     Args:
         problem: the case.
         correlation: of the noise; none is tried as well.
-        fitted: weights of rows → mean reading beside some hypothesis.
+        fitted: weights of rows → mean reading given some hypothesis.
     """
     quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
     ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
@@ -159,7 +178,7 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
 
 
 def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
-    """Tell whether wild rows err to the same side as wild rows before them too often.
+    """Whether wild rows err too often to the same side as wild rows before them.
 
     Args:
         wild: errors of wild rows, 0 of the others.

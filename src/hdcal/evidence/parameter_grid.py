@@ -1,163 +1,150 @@
-"""Where an effect is computed: quantiles of its shapes, cells of its amplitude."""
+"""Points of an effect: quantiles of its shape parameters, cells of its amplitude."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
+from scipy.special import erf
 
-from hdcal.data.priors import Prior
+from hdcal.data.prior import Prior
 from hdcal.inference.distributions import frozen, moments
 from hdcal.physics.effect import Effect, parameters
 
+Kind = Literal["linear", "cells", "subspace"]
 # Quantiles of a shape parameter; with several, the number of each. An effect that is
 # not linear in its amplitude has many cells at each of them, and gets fewer.
-SHAPE_POINTS = {"linear": (25, 7, 4), "cells": (7, 4, 3), "subspace": (31, 5, 3)}
-# Edges of the amplitude's cells reach from the first to the last, in prior sds.
-SMALLEST, LARGEST = 1.0 / 64.0, 64.0
-# Ratio of neighbouring edges: an effect that is linear in its amplitude needs cells
-# only because the tolerance of its shape grows with it.
-COARSE, FINE = 2.0, 2.0**0.5
-# How much narrower or wider than stated the prior of a zero-centred amplitude may be,
-# and with which probability: sizes on a rig are known to a factor of some only, and
-# small ones are as ordinary as large ones.
+_SHAPE_POINTS = {"linear": (25, 7, 4), "cells": (7, 4, 3), "subspace": (31, 5, 3)}
+# First and last edge of the amplitude's cells, in prior sds, and number of cells
+# between: neighbouring edges differ by a factor √2.
+_SMALLEST, _LARGEST, _CELLS = 1.0 / 64.0, 64.0, 24
+# Factors on the prior sd of a zero-centred amplitude, and their probabilities: sizes on
+# a rig are known to a small factor only, and small ones are as ordinary as large ones.
 SCALES = np.array([0.1, 1.0 / 3.0, 1.0, 3.0, 10.0])
 SCALE_WEIGHTS = np.array([0.15, 0.2, 0.3, 0.2, 0.15])
+# Least probability of a cell, whose logarithm is needed.
+_LEAST = 1e-300
 
 
 @dataclass(frozen=True)
 class ParameterGrid:
-    """Shape points and amplitude cells of one effect.
+    """Shape points and amplitude prior of one effect.
 
     Attributes:
         effect: the effect.
         amplitudes: names of its amplitudes; several only where it is linear in them.
         shapes: values of the shape parameters at each shape point, by name.
-        edges: increasing edges of the amplitude's cells, shape (c + 1,).
-        mean: of the amplitude's prior.
-        sd: of the amplitude's prior.
-        normal: the prior is normal, or half of one; else cells are filled evenly.
-        one_sided: the prior is half normal.
-        mass: of each cell where the prior is not normal.
+        prior: of the (first) amplitude.
+        mean: of a normal prior of the amplitude, else 0.
+        sd: of the amplitude's prior; of a half-normal one, its scale.
     """
 
     effect: type[Effect]
     amplitudes: tuple[str, ...]
     shapes: dict[str, np.ndarray]
-    edges: np.ndarray
+    prior: Prior
     mean: float
     sd: float
-    normal: bool
-    one_sided: bool
-    mass: np.ndarray
 
     @property
     def size(self) -> int:
         """Number of shape points."""
         return len(next(iter(self.shapes.values()))) if self.shapes else 1
 
-    def one_amplitude_each(
-        self, shapes: Mapping[str, np.ndarray]
-    ) -> dict[str, np.ndarray]:
-        """Return values in which one amplitude after the other is its prior sd.
-
-        Args:
-            shapes: values of the shape parameters, by name, each of shape (s,).
-
-        Returns:
-            Of shape (s · number of amplitudes,) each; the amplitudes change first.
-        """
-        count = len(self.amplitudes)
-        points = len(next(iter(shapes.values()))) if shapes else 1
-        values = {name: np.repeat(value, count) for name, value in shapes.items()}
-        for index, name in enumerate(self.amplitudes):
-            values[name] = np.tile(self.sd * np.eye(count)[index], points)
-        return values
+    @property
+    def normal(self) -> bool:
+        """Whether the prior is normal or half-normal."""
+        return self.prior.family in ("normal", "half_normal")
 
     @property
-    def centred(self) -> bool:
-        """Whether a wider prior is only a matter of scale."""
-        return self.normal and self.mean == 0.0
+    def one_sided(self) -> bool:
+        """Whether the prior is half-normal."""
+        return self.prior.family == "half_normal"
+
+    @property
+    def widths(self) -> tuple[np.ndarray, np.ndarray]:
+        """Factors on the prior sd of the amplitude, and their probabilities."""
+        if self.normal and self.mean == 0.0:
+            return SCALES, SCALE_WEIGHTS
+        return np.ones(1), np.ones(1)
+
+    @property
+    def unit(self) -> float:
+        """An amplitude that the prior allows."""
+        return self.mean + 2.0 * self.sd
+
+    def at(self, amplitudes, shape: int | None = None) -> dict[str, np.ndarray]:
+        """Return parameter values at amplitudes; the amplitude changes first.
+
+        Args:
+            amplitudes: of the only amplitude, shape (a,); or of several, shape
+                (a, number of amplitudes).
+            shape: index of a shape point; by default all of them.
+        """
+        table = np.asarray(amplitudes, float).reshape(-1, len(self.amplitudes))
+        points = [shape] if shape is not None else range(self.size)
+        values = {
+            name: np.repeat(column[list(points)], len(table))
+            for name, column in self.shapes.items()
+        }
+        for name, column in zip(self.amplitudes, table.T, strict=True):
+            values[name] = np.tile(column, len(points))
+        return values
+
+    def cells(self) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " c"]]:
+        """Return the edges of amplitude cells, and the prior probability of each."""
+        if not self.normal:
+            law = frozen(self.prior)
+            ends = np.concatenate([[1e-6], np.linspace(0.02, 0.98, 25), [1.0 - 1e-6]])
+            edges = np.unique(law.ppf(ends))
+            return edges, np.maximum(np.diff(law.cdf(edges)), _LEAST)
+        steps = np.geomspace(_SMALLEST, _LARGEST, _CELLS + 1)
+        steps = np.concatenate([[0.0], steps])
+        if not self.one_sided:
+            steps = np.concatenate([-steps[:0:-1], steps])
+        scales, weights = self.widths
+        below = 0.5 * erf(steps[:, None] / (np.sqrt(2.0) * scales)) @ weights
+        mass = (2.0 if self.one_sided else 1.0) * np.diff(below)
+        return self.mean + self.sd * steps, np.maximum(mass, _LEAST)
 
 
 def make_grid(
-    effect: type[Effect],
-    priors: Mapping[str, Prior],
-    ratio: float = COARSE,
-    kind: str = "linear",
+    effect: type[Effect], priors: Mapping[str, Prior], kind: Kind = "linear"
 ) -> ParameterGrid:
-    """Return the points and cells of one effect.
+    """Return the points of one effect.
 
     Args:
         effect: of the library.
         priors: by site name, `effect.parameter`.
-        ratio: of neighbouring amplitude edges.
-        kind: of `SHAPE_POINTS`.
+        kind: how the effect depends on its amplitudes.
     """
     own = {name: priors[f"{effect.name}.{name}"] for name in parameters(effect)}
     amplitudes = tuple(n for n, p in parameters(effect).items() if p.null is not None)
     prior = own[amplitudes[0]]
-    free = {n: p for n, p in own.items() if n not in amplitudes}
-    edges = amplitude_edges(prior, ratio)
-    mass = np.ones(len(edges) - 1)
+    if prior.family == "fixed":
+        raise ValueError("the amplitude of an effect cannot be fixed")
     normal = prior.family in ("normal", "half_normal")
-    if not normal:
-        mass = np.diff(frozen(prior).cdf(edges))
     return ParameterGrid(
         effect=effect,
         amplitudes=amplitudes,
-        shapes=_shape_points(free, SHAPE_POINTS[kind]),
-        edges=edges,
+        shapes=_shapes({n: p for n, p in own.items() if n not in amplitudes}, kind),
+        prior=prior,
         mean=float(prior.numbers[0]) if prior.family == "normal" else 0.0,
-        sd=moments(prior)[1] if not normal else float(prior.numbers[-1]),
-        normal=normal,
-        one_sided=prior.family == "half_normal",
-        mass=mass,
+        sd=float(prior.numbers[-1]) if normal else moments(prior)[1],
     )
 
 
-def _shape_points(
-    free: Mapping[str, Prior], points: tuple[int, ...]
-) -> dict[str, np.ndarray]:
+def _shapes(free: Mapping[str, Prior], kind: Kind) -> dict[str, np.ndarray]:
+    """Return all combinations of equally probable values of the shape parameters."""
     varied = sum(prior.family != "fixed" for prior in free.values())
-    count = points[min(max(varied, 1), len(points)) - 1]
-    return quantile_grid(free, dict.fromkeys(free, count))
-
-
-def quantile_grid(
-    priors: Mapping[str, Prior], counts: Mapping[str, int]
-) -> dict[str, np.ndarray]:
-    """Return all combinations of equally probable values of several parameters.
-
-    Args:
-        priors: of each parameter, by name.
-        counts: values of each; a fixed parameter has one.
-
-    Returns:
-        Values of each parameter at all points, all of one length.
-    """
-    axes = []
-    for name, prior in priors.items():
-        quantiles = (np.arange(counts[name]) + 0.5) / counts[name]
-        fixed = prior.family == "fixed"
-        axes.append(prior.numbers[:1] if fixed else frozen(prior).ppf(quantiles))
+    counts = _SHAPE_POINTS[kind]
+    count = counts[min(max(varied, 1), len(counts)) - 1]
+    quantiles = (np.arange(count) + 0.5) / count
+    axes = [
+        prior.numbers[:1] if prior.family == "fixed" else frozen(prior).ppf(quantiles)
+        for prior in free.values()
+    ]
     table = np.array(list(product(*axes)), float)
-    return dict(zip(priors, table.T, strict=True))
-
-
-def amplitude_edges(prior: Prior, ratio: float) -> np.ndarray:
-    """Return the edges of the amplitude's cells, up to far beyond its prior."""
-    count = round(np.log(LARGEST / SMALLEST) / np.log(ratio))
-    steps = np.concatenate([[0.0], np.geomspace(SMALLEST, LARGEST, count + 1)])
-    match prior.family:
-        case "half_normal":
-            return steps * float(prior.numbers[0])
-        case "normal":
-            mean, sd = map(float, prior.numbers)
-            return mean + sd * np.concatenate([-steps[:0:-1], steps])
-        case "fixed":
-            raise ValueError("the amplitude of an effect cannot be fixed")
-    law = frozen(prior)
-    return np.unique(
-        law.ppf(np.concatenate([[1e-6], np.linspace(0.02, 0.98, 25), [1 - 1e-6]]))
-    )
+    return dict(zip(free, table.T, strict=True))

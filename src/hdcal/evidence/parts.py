@@ -13,7 +13,7 @@ from hdcal.evidence.noise_models import NoiseModel
 
 
 class Context(NamedTuple):
-    """What is taken into the base beside which items are evaluated.
+    """What is taken into the base given which items are evaluated.
 
     Attributes:
         offset: fixed contribution [N].
@@ -25,7 +25,7 @@ class Context(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where an item stands in the tables of a selection: row and column."""
+    """Row and column of an item in the tables of a selection."""
 
     row: int
     column: int

@@ -1,54 +1,49 @@
-"""Inner products of whitened curves beside the base and a context."""
+"""Evidence of items in whitened rows, with the base and a context projected out."""
 
 from typing import NamedTuple
 
+import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from hdcal.evidence.items import Amplitudes
 from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.marginal import Marginal, Products, log_marginal
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context
 from hdcal.inference.serial_correlation import log_volume
 
 
-class Axes(NamedTuple):
-    """Principal axes of columns beside the base.
+class Block(NamedTuple):
+    """Whitened items with the same number of loose columns.
 
     Attributes:
-        square: their squared lengths, shape (s, j).
-        rotation: from the columns to the axes, shape (s, j, j).
-        inside: products of the columns with what the base spans, shape (s, j, p).
-        along_y: products of the columns with the readings, base included, (s, j).
+        owner: index of the component; −1 of the base alone, shape (m,).
+        amplitude: priors of the amplitudes.
+        variance: prior variances of the loose coefficients, shape (m, t).
+        log_weight: log prior probability at each of them, shape (m, t).
+        offset: shape (m, n).
+        slope: shape (m, n).
+        loose: shape (m, j, n).
+        gram: products of the loose columns with each other, shape (m, j, j).
+        with_offset: products of the loose columns with the offset, shape (m, j).
+        with_slope: products of the loose columns with the slope, shape (m, j).
     """
 
-    square: Float[np.ndarray, "s j"]
-    rotation: Float[np.ndarray, "s j j"]
-    inside: Float[np.ndarray, "s j p"]
-    along_y: Float[np.ndarray, "s j"]
-
-    def products(
-        self, along: Float[np.ndarray, "s j"], base: Float[np.ndarray, "s p"]
-    ) -> Float[np.ndarray, "s j"]:
-        """Return products of the axes, at their lengths, with a curve for each space.
-
-        Args:
-            along: products of the columns with the curves, base included.
-            base: products of the curves with what the base spans.
-        """
-        left = along - np.einsum("sjp,sp->sj", self.inside, base)
-        return np.einsum("sj,sjk->sk", left, self.rotation)
+    owner: Int[np.ndarray, " m"]
+    amplitude: Amplitudes
+    variance: Float[np.ndarray, "m t"]
+    log_weight: Float[np.ndarray, "m t"]
+    offset: Float[np.ndarray, "m n"]
+    slope: Float[np.ndarray, "m n"]
+    loose: Float[np.ndarray, "m j n"]
+    gram: Float[np.ndarray, "m j j"]
+    with_offset: Float[np.ndarray, "m j"]
+    with_slope: Float[np.ndarray, "m j"]
 
 
-class Curves(NamedTuple):
-    """Products of whitened errors and slopes.
-
-    Attributes:
-        ee: of error and error beside the base, shape (m,).
-        eu: of error and slope, likewise.
-        uu: of slope and slope, likewise.
-        error_q: of errors and what the base spans, shape (m, p).
-        slope_q: of slopes and what the base spans, likewise.
-    """
+class _Curves(NamedTuple):
+    """Products of errors and slopes less the base, and with what the base spans."""
 
     ee: Float[np.ndarray, " m"]
     eu: Float[np.ndarray, " m"]
@@ -63,10 +58,7 @@ class Projection:
     Attributes:
         problem: the case.
         noise: model of the noise.
-        q: what the base spans, above its priors, shape (n, p).
-        y: whitened readings, less the context's offset, shape (n,).
-        y_q: their products with q, shape (p,).
-        square: their square beside the base.
+        square: square of the whitened readings with the base projected out.
         constant: part of every log evidence: priors and volume of the whitening.
     """
 
@@ -76,10 +68,11 @@ class Projection:
         held = np.full(len(columns), problem.noise_sd)
         stacked = np.vstack([self.whiten(columns).T, np.diag(held)])
         q, r = np.linalg.qr(stacked)
-        self.q = q[: len(problem.y)]
-        self.y = self.whiten(problem.y - context.offset)
-        self.y_q = self.y @ self.q
-        self.square = float(self.y @ self.y - self.y_q @ self.y_q)
+        # What the base spans, above its priors, and the readings along it.
+        self._q = q[: len(problem.y)]
+        self._y = self.whiten(problem.y - context.offset)
+        self._y_q = self._y @ self._q
+        self.square = float(self._y @ self._y - self._y_q @ self._y_q)
         volume = log_volume(np.sum(problem.before >= 0), noise.correlation)
         log_det = np.sum(np.log(np.abs(np.diag(r)))) - np.sum(np.log(held))
         counting = noise.weight[noise.weight > 0.0]
@@ -90,38 +83,109 @@ class Projection:
         """Return curves, rows last, in which the noise is independent."""
         return self.problem.whiten(curves, self.noise.weight, self.noise.correlation)
 
-    def curves(
-        self, offset: Float[np.ndarray, "m n"], slope: Float[np.ndarray, "m n"]
-    ) -> "Curves":
+    def block(
+        self,
+        owner: Int[np.ndarray, " m"],
+        amplitude: Amplitudes,
+        variance: Float[np.ndarray, "m t"],
+        log_weight: Float[np.ndarray, "m t"],
+        *curves: np.ndarray,
+    ) -> Block:
+        """Return items whitened.
+
+        Args:
+            owner: as in `Block`, as are all others.
+            amplitude: priors.
+            variance: of the loose coefficients.
+            log_weight: at each of them.
+            curves: offset, slope and loose columns [N].
+        """
+        offset, slope, loose = map(self.whiten, curves)
+        gram = loose @ np.swapaxes(loose, 1, 2)
+        along = ((loose @ each[..., None])[..., 0] for each in (offset, slope))
+        what = owner, amplitude, variance, log_weight
+        return Block(*what, offset, slope, loose, gram, *along)
+
+    def evaluate(self, block: Block, only: set[int] | None = None) -> Marginal:
+        """Return the evidence of items, with the weights of their prior.
+
+        Args:
+            block: the items.
+            only: the components that are wanted; by default all. The others have no
+                evidence.
+        """
+        rows = slice(None)
+        if only is not None:
+            rows = np.flatnonzero(np.isin(block.owner, [*only, -1]))
+        some = jax.tree.map(lambda column: column[rows], block)
+        curves = self._curves(some.offset, some.slope)
+        # Through all columns once: of many rows they take longer to read than to use.
+        flat = some.loose.reshape(-1, some.loose.shape[-1])
+        along = flat @ np.column_stack([self._q, self._y])
+        along = along.reshape(*some.loose.shape[:-1], along.shape[1])
+        inside, along_y = along[..., :-1], along[..., -1]
+        square, rotation = np.linalg.eigh(
+            some.gram - inside @ np.swapaxes(inside, 1, 2)
+        )
+
+        def of_axes(columns, base):
+            left = columns - np.einsum("sjp,sp->sj", inside, base)
+            return np.einsum("sj,sjk->sk", left, rotation)
+
+        products = Products(
+            *curves[:3],
+            of_axes(along_y - some.with_offset, curves.error_q),
+            of_axes(some.with_slope, curves.slope_q),
+            np.maximum(square, 0.0),
+        )
+        found = self._marginal(products, some.variance, some.amplitude)
+        weighted = found.log_evidence + some.log_weight
+        found = found._replace(log_evidence=weighted)
+        if only is None:
+            return found
+        table = np.full((3, *block.variance.shape), -np.inf)
+        table[:, rows] = found
+        return Marginal(*table)
+
+    def evaluate_curves(
+        self,
+        offset: Float[np.ndarray, "c n"],
+        slope: Float[np.ndarray, "c n"],
+        curve: Int[np.ndarray, " m"],
+        amplitude: Amplitudes,
+    ) -> Marginal:
+        """Return the evidence of curves without loose columns, shape (m, 1).
+
+        Args:
+            offset: of each curve [N].
+            slope: of each curve [N].
+            curve: index of the curve of each item.
+            amplitude: prior of each item.
+        """
+        curves = self._curves(self.whiten(offset), self.whiten(slope))
+        none = np.zeros((len(curve), 0))
+        ee, eu, uu = (each[curve] for each in curves[:3])
+        products = Products(ee, eu, uu, none, none, none)
+        return self._marginal(products, np.zeros((len(curve), 1)), amplitude)
+
+    def _marginal(self, products: Products, variance, amplitude) -> Marginal:
+        problem = self.problem
+        given = products, variance, amplitude, problem.noise_prior
+        found = log_marginal(problem.count, *given)
+        return found._replace(log_evidence=found.log_evidence + self.constant)
+
+    def _curves(self, offset, slope) -> _Curves:
         """Return products of the errors, the readings less offsets, and of slopes."""
-        error = self.y - offset
-        error_q, slope_q = self.y_q - offset @ self.q, slope @ self.q
+        error = self._y - offset
+        error_q, slope_q = self._y_q - offset @ self._q, slope @ self._q
 
         def product(a, b, a_q, b_q):
             return np.einsum("mn,mn->m", a, b) - np.einsum("mp,mp->m", a_q, b_q)
 
-        return Curves(
+        return _Curves(
             product(error, error, error_q, error_q),
             product(error, slope, error_q, slope_q),
             product(slope, slope, slope_q, slope_q),
             error_q,
             slope_q,
         )
-
-    def axes(
-        self, white: Float[np.ndarray, "s j n"], gram: Float[np.ndarray, "s j j"]
-    ) -> Axes:
-        """Return the principal axes of whitened columns.
-
-        Args:
-            white: the columns.
-            gram: their inner products, base included.
-        """
-        flat = white.reshape(-1, white.shape[-1])
-        # Through all columns once: of many rows they take longer to read than to use.
-        found = flat @ np.column_stack([self.q, self.y])
-        found = found.reshape(*white.shape[:-1], found.shape[1])
-        inside = found[..., :-1]
-        left = gram - inside @ np.swapaxes(inside, 1, 2)
-        square, rotation = np.linalg.eigh(left)
-        return Axes(np.maximum(square, 0.0), rotation, inside, found[..., -1])

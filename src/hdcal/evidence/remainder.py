@@ -1,25 +1,29 @@
-"""Structure outside the library, as kernels over the covariates of the rows.
+"""Structure outside the library: kernels over covariates, and local structure.
 
 A kernel is a space: smooth functions of one covariate, labels, products of two of them,
-or a Matérn-½ process over the order of the rows.
+or a Matérn-½ process over the order of the rows. Local structure is one stretch of rows
+or one period: each family of directions enters with its likeliest member, whose prior
+is divided by the size of the family.
 """
 
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from hdcal.evidence.components import (
-    MOST_COLUMNS,
-    STEPS,
-    Components,
-    Space,
-    principal,
-)
-from hdcal.evidence.covariates import cosines, half_cycle_rows
+from hdcal.evidence.components import Components
+from hdcal.evidence.items import MOST_COLUMNS, STEPS, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.evidence.row_features import half_cycles, place_in_run, scale_to_unit
+from hdcal.evidence.row_features import (
+    cosines,
+    half_cycle_rows,
+    half_cycles,
+    place_in_run,
+    scale_to_unit,
+)
+
+# Pairs of directions, shape (f, 2, n).
+Family = Float[np.ndarray, "f 2 n"]
 
 # Cosines along one covariate, along each of two, and most labels of a kernel.
 _ALONE, _TOGETHER, _LABELS = 16, 4, 24
@@ -30,20 +34,15 @@ _LEAST = 1e-3
 _SAME, _SPANNED = 0.97, 0.9
 # Length of the Matérn-½ process as a share of a half cycle.
 _LENGTH = 0.5
-
-
-class _Features(NamedTuple):
-    """Functions (k, n) of each covariate, smoothest first, and indicators of labels."""
-
-    smooth: dict[str, np.ndarray]
-    labels: dict[str, np.ndarray]
-
-
-def _features(problem: LinearProblem) -> _Features:
-    return _Features(_smooth(problem), _labels(problem))
+# Shortest stretch as a share of all rows; most periods, by rows and by the clock.
+_FINEST, _MOST_PERIODS, _MOST_BY_TIME = 1.0 / 32.0, 96, 384
+# Rows are uneven in time where the longest step is so many median ones; pauses count
+# as at most so many.
+_UNEVEN, _LONGEST_PAUSE = 1.5, 30.0
 
 
 def _smooth(problem: LinearProblem) -> dict[str, np.ndarray]:
+    """Return functions (k, n) of each covariate, smoothest first."""
     records, known = problem.records, problem.records.known
     found = {"deformation": cosines(scale_to_unit(records.deformation), _ALONE)}
     if "temperature" in known and np.ptp(records.temperature) > 0.05:
@@ -63,11 +62,12 @@ def _smooth(problem: LinearProblem) -> dict[str, np.ndarray]:
 
 
 def _levels(values, digits: int) -> int:
-    """Return how many functions so many different values can tell apart."""
+    """Return the number of functions that so many different values determine."""
     return max(1, len(np.unique(np.round(values, digits))) - 1)
 
 
 def _labels(problem: LinearProblem) -> dict[str, np.ndarray]:
+    """Return indicators (k, n) of labels."""
     records, found = problem.records, {}
     if "unloading" in records.known:
         found["direction"] = np.asarray(records.sense, float)[None]
@@ -102,7 +102,7 @@ def _matern(problem: LinearProblem) -> Float[np.ndarray, "k n"]:
 
 def _tables(problem: LinearProblem) -> list[Float[np.ndarray, "k n"]]:
     """Return the columns of each kernel: covariates, slopes over them, products."""
-    smooth, labels = _features(problem)
+    smooth, labels = _smooth(problem), _labels(problem)
     alone = {n: _weighted(table, _ALONE) for n, table in smooth.items()} | labels
     deformation = np.asarray(problem.records.deformation)
     slope = deformation / np.max(np.abs(deformation))
@@ -182,3 +182,85 @@ def remainder_space(
     sd = float(problem.priors["gap_sd"].numbers[-1])
     log_weight = np.full(len(STEPS), -np.log(len(STEPS)) - np.log(choices))
     return Space(owner, columns, sd * STEPS, log_weight)
+
+
+def local_families(problem: LinearProblem) -> list[Family]:
+    """Return families of directions: stretches in two orders, periods, by the clock."""
+    count = len(problem.y)
+    deformation = np.asarray(problem.records.deformation)
+    slope = deformation / deformation[np.argmax(np.abs(deformation))]
+    found = []
+    for path in (np.arange(count), np.argsort(slope, kind="stable")):
+        inside = _stretches(count)
+        table = np.zeros_like(inside)
+        table[:, path] = inside
+        # A stretch may be off by a force or by a part of the stiffness.
+        found.append(np.stack([table, table * slope], axis=1))
+    found.append(_waves(np.arange(count) / count, min(count // 2, _MOST_PERIODS)))
+    found += _by_the_clock(problem)
+    return [family for family in found if len(family)]
+
+
+def _by_the_clock(problem: LinearProblem) -> list[Family]:
+    """Return periods in time, where rows are uneven in it."""
+    records = problem.records
+    step = np.maximum(np.diff(np.asarray(records.time, float)), 0.0)
+    step[np.diff(np.asarray(records.run)) != 0] = 0.0
+    moves = step[step > 0.0]
+    if "time" not in records.known or not len(moves):
+        return []
+    usual = float(np.median(moves))
+    if np.max(moves) < _UNEVEN * usual:
+        return []
+    step = np.minimum(step, _LONGEST_PAUSE * usual)
+    place = np.concatenate([[0.0], np.cumsum(step)]) / np.sum(step)
+    return [_waves(place, min(int(0.5 * np.sum(step) / usual), _MOST_BY_TIME))]
+
+
+def _stretches(count: int) -> Float[np.ndarray, "f n"]:
+    """Return indicators of stretches that overlap by half, each half as long."""
+    length, found = count // 2, [np.zeros((0, count))]
+    while length >= max(2, count * _FINEST):
+        starts = np.arange(0, count - length + 1, max(length // 2, 1))
+        place = np.arange(count) - starts[:, None]
+        found.append(((place >= 0) & (place < length)).astype(float))
+        length //= 2
+    return np.concatenate(found)
+
+
+def _waves(place: Float[np.ndarray, " n"], most: int) -> Family:
+    turns = 2.0 * np.pi * np.arange(2, most + 1)[:, None] * place
+    return np.stack([np.cos(turns), np.sin(turns)], axis=1)
+
+
+def likeliest_members(
+    problem: LinearProblem, families: list[Family], owner: int
+) -> list[Space]:
+    """Return the member of each family that the readings show most.
+
+    Args:
+        problem: the case, its base with all that is taken as known.
+        families: of pairs of directions.
+        owner: index of the remainder among the components.
+    """
+    error = problem.project(problem.y)
+    half = np.linalg.solve(problem.root.T, problem.X.T).T
+    found = []
+    for family in families:
+        # One large product of matrices, not many small ones.
+        along = family.reshape(-1, len(error)) @ np.column_stack([half, error])
+        along = along.reshape(len(family), 2, -1)
+        inside = along[..., :-1]
+        gram = family @ np.swapaxes(family, 1, 2) - inside @ np.swapaxes(inside, 1, 2)
+        (a, b), (_, d) = np.moveaxis(gram, 0, -1)
+        ridge = 1e-9 * np.max(a + d)
+        a, d = a + ridge, d + ridge
+        one, two = along[..., -1].T
+        # Decrease of the squared error by the best combination of both directions.
+        gain = (d * one**2 - 2.0 * b * one * two + a * two**2) / (a * d - b**2)
+        best = problem.project(family[int(np.argmax(gain))])
+        size = np.sqrt(np.sum(np.mean(best**2, axis=1)))
+        if size > 0.0:
+            space = remainder_space(problem, owner, best / size, len(family))
+            found.append(space)
+    return found

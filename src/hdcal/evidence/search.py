@@ -1,62 +1,32 @@
-"""The search over hypotheses: single components, pairs, and both with a remainder.
+"""All hypotheses of a case: made linear, evaluated alone, then extended to pairs."""
 
-Everything is evaluated alone under every model of the noise. Then the most probable
-components become contexts, one after the other, beside which everything is evaluated
-again, and the best pairs are refined and looked at beside a remainder.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.evidence.coarse_reading import coarse_step, with_coarse_step
-from hdcal.evidence.components import Space, components
-from hdcal.evidence.covariates import Predicting, half_cycle_rows, predicting
-from hdcal.evidence.evaluation import Evaluated, Selection
-from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
-from hdcal.evidence.linear_problem import Expansion, LinearProblem, linear_problem
-from hdcal.evidence.local_structure import likeliest_members, local_families
-from hdcal.evidence.noise_models import (
-    GROWING,
-    OUTLIERS,
-    NoiseModel,
-    correlated_noise,
-    equal_noise,
-    growing_noise,
-    outliers,
+from hdcal.evidence.components import Components, Predicting
+from hdcal.evidence.evaluation import Selection
+from hdcal.evidence.hypotheses import Hypotheses
+from hdcal.evidence.linear_problem import LinearProblem, linear_problem
+from hdcal.evidence.noise_models import NoiseModel
+from hdcal.evidence.parts import posterior
+from hdcal.evidence.row_features import (
+    average_rows,
+    coarse_step,
+    half_cycle_rows,
+    thin_rows,
+    with_coarse_step,
 )
-from hdcal.evidence.parts import (
-    Part,
-    join,
-    log_sign_probability,
-    merged,
-    posterior,
-)
-from hdcal.evidence.remainder import kernels
-from hdcal.evidence.selection import select
-from hdcal.evidence.table import OUTSIDE, EvidenceTable, Names
+from hdcal.evidence.table import EvidenceTable
 from hdcal.physics.effect import Effect
 
-# Components beside which others are looked for; models of the noise used there, and
-# their least probability.
-_CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
-# Log evidence below the best beside a context from which on a hypothesis is left out.
-_HOPELESS = 25.0
-# Pairs that are refined, times, and looked at beside a remainder.
-_REFINED, _TIMES = 3, 2
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
-# Difference of correlations that are the same.
-_SAME_CORRELATION = 0.01
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
 # cycle.
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
-# Most kernels of a remainder, and prior odds of one more.
-_MOST_KERNELS, _ONE_MORE = 4, 0.25
-# Kernels and local families that share the prior of the remainder, at least.
-_LEAST_SHARING = 15
 
 
 @dataclass(frozen=True)
@@ -66,8 +36,9 @@ class Searched:
     Attributes:
         problem: the linear problem.
         table: evidence of each hypothesis.
-        predicting: effects of the library by what the rows tell about them.
-        selection: the components that were compared.
+        predicting: effects of the library by whether they predict something.
+        components: of these effects.
+        selection: the items that were compared.
         kernels: columns of each kernel of the remainder [N], shape (j, n).
         coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
     """
@@ -75,6 +46,7 @@ class Searched:
     problem: LinearProblem
     table: EvidenceTable
     predicting: Predicting
+    components: Components
     selection: Selection
     kernels: list[np.ndarray]
     coarse_step: float
@@ -93,17 +65,15 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case = average_rows(with_coarse_step(case), MOST_ROWS)
+    case = average_rows(with_coarse_step(case))
     problem = linear_problem(case, library, free_runs=free_runs)
-    found = _Search(problem, library)
-    found.alone(range(len(problem.correlations)))
+    found = Hypotheses(problem, library)
     if _oversampled(problem, found.table):
         return search(thin_rows(case, _STEP), library, free_runs=free_runs)
     about = _expansion(problem, found.table)
     if about is not None:
-        problem = linear_problem(case, library, about, free_runs=free_runs)
-        found = _Search(problem, library, found.kernels)
-        found.alone(range(len(problem.correlations)))
+        problem = linear_problem(case, library, free_runs=free_runs, **about)
+        found = Hypotheses(problem, library, found.kernels)
     found.fitted_correlations()
     step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
@@ -114,6 +84,7 @@ def search(
         problem=problem,
         table=found.table,
         predicting=found.predicting,
+        components=found.components,
         selection=found.selection,
         kernels=[space.columns for space in found.kernels],
         coarse_step=step,
@@ -121,15 +92,15 @@ def search(
 
 
 def _oversampled(problem: LinearProblem, table: EvidenceTable) -> bool:
-    """Return whether noise is correlated as far as the grid reaches, in many rows."""
-    if int(np.argmax(table.noise_probabilities())) < len(problem.correlations) - 1:
+    """Whether noise is correlated as far as the grid reaches, in many rows."""
+    if int(np.argmax(table.noise_probabilities())) < len(table.noises) - 1:
         return False
     enough = len(problem.y) >= _STEP * _FEWEST
     return enough and half_cycle_rows(problem.records) >= _STEP * _FEWEST_OF_HALF
 
 
-def _expansion(problem: LinearProblem, table: EvidenceTable) -> Expansion | None:
-    """Return the point of expansion beside the best hypothesis, where it differs."""
+def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
+    """Return noise sd and stiffness given the best hypothesis, where they differ."""
     parts = table.parts[table.ranked()[0]]
     found = posterior(problem, NoiseModel("", np.ones(len(problem.y)), 0.0, 0.0), parts)
     # The first coefficient is the deviation of the log stiffness from its prior mean.
@@ -144,196 +115,5 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> Expansion | None
     louder = abs(np.log(noise_sd / problem.noise_sd)) > _SAME_NOISE
     if deviation <= -1.0 or not (moved or louder):
         return None
-    return Expansion(noise_sd, float(problem.base.stiffness) * (1.0 + deviation))
-
-
-class _Search:
-    """Fills the table of one linear problem."""
-
-    def __init__(
-        self,
-        problem: LinearProblem,
-        library: Mapping[str, type[Effect]],
-        known_kernels: list[Space] | None = None,
-    ):
-        self.problem, self.predicting = problem, predicting(library, problem.records)
-        effects = components(self.predicting.effects, problem)
-        self.outside = len(effects.names)
-        self.families = local_families(problem)
-        self.kernels = (
-            kernels(problem, effects, self.outside)
-            if known_kernels is None
-            else known_kernels
-        )
-        sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
-        self.log_sharing = float(np.log(sharing))
-        self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
-        self.selection = select(
-            problem,
-            self.table.noises,
-            effects,
-            self._sharing(self.kernels),
-            self.table.names,
-        )
-        self.found_alone: dict[int, Evaluated] = {}
-
-    def _sharing(self, spaces: Sequence[Space]) -> list[Space]:
-        """Return spaces of the remainder, among which its prior is shared."""
-        return [
-            space._replace(log_weight=space.log_weight - self.log_sharing)
-            for space in spaces
-        ]
-
-    def evaluate(
-        self,
-        columns: Sequence[int],
-        parts: Sequence[Part],
-        only: set[int] | None = None,
-    ) -> dict[int, Evaluated]:
-        """Evaluate everything beside some parts under several models of the noise."""
-        context, local = join(self.problem, parts), []
-        if only is None or self.outside in only:
-            beside = self.problem.with_columns(context.offset, context.columns)
-            local = likeliest_members(beside, self.families, self.outside)
-            local = self._sharing(local)
-        noises, evaluate = self.table.noises, self.selection.evaluate
-        return {
-            column: evaluate(noises[column], context, local, only) for column in columns
-        }
-
-    def alone(self, columns: Sequence[int]) -> None:
-        """Enter none and each component alone."""
-        table = self.table
-        for column, found in self.evaluate(columns, []).items():
-            self.found_alone[column] = found
-            table.put((), column, found.none, list)
-            for k, value in enumerate(found.totals()):
-                if np.isfinite(value):
-                    table.put(
-                        (table.names[k],),
-                        column,
-                        float(value),
-                        lambda k=k, found=found: [found.likeliest(k)],
-                    )
-
-    def fitted_correlations(self) -> None:
-        """Enter everything alone with the correlations that two hypotheses leave.
-
-        In many rows a correlation between two of the grid fits much better than both.
-        """
-        table, problem = self.table, self.problem
-        for key in dict.fromkeys([(), table.ranked()[0]]):
-            fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            more = correlated_noise(problem, problem.y - fit.reading)
-            known = np.array([noise.correlation for noise in table.noises])
-            if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
-                table.add_noises([more])
-                self.alone([len(table.noises) - 1])
-
-    def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
-        """Enter everything alone under the library's models of the noise."""
-        table, problem = self.table, self.problem
-        likeliest = int(np.argmax(table.noise_probabilities()))
-        correlation = table.noises[likeliest].correlation
-        more = growing_noise(problem, correlation) if GROWING in library else []
-        if OUTLIERS in library:
-            for key in dict.fromkeys([(), table.ranked()[0]]):
-                parts = table.parts[key]
-
-                def fitted(weight, parts=parts):
-                    equal = NoiseModel("", weight, 0.0, 0.0)
-                    return posterior(problem, equal, parts).reading
-
-                more += outliers(problem, correlation, fitted)
-        count = len(table.noises)
-        table.add_noises(more)
-        self.alone(range(count, len(table.noises)))
-
-    def pairs(self) -> None:
-        """Enter pairs, and components and pairs beside a remainder."""
-        table = self.table
-        chance = table.noise_probabilities()
-        columns = [
-            int(column)
-            for column in np.argsort(-chance)[:_MOST_NOISES]
-            if chance[column] >= _LEAST_NOISE
-        ]
-        leading = table.ranked(1)[:_CONTEXTS]
-        if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
-            leading[-1] = (OUTSIDE,)
-        if (OUTSIDE,) in table.parts:
-            self._grow((OUTSIDE,), columns)
-        for key in leading:
-            self._beside(table.parts[key], columns)
-        for _ in range(_TIMES):
-            for key in table.ranked(2)[:_REFINED]:
-                self._refine(key, columns[:1])
-        for key in table.ranked(2)[:_REFINED]:
-            if OUTSIDE not in key:
-                self._beside(table.parts[key], columns, {self.outside})
-        beside = [key for key in table.ranked() if OUTSIDE in key and len(key) > 1]
-        for key in beside[:_REFINED]:
-            self._grow(key, columns[:1])
-
-    def _grow(self, key: Names, columns: Sequence[int]) -> None:
-        """Add kernels to the remainder of a hypothesis while the readings ask for more.
-
-        Args:
-            key: the hypothesis.
-            columns: indices of the models of the noise.
-        """
-        table = self.table
-        for _ in range(_MOST_KERNELS - 1):
-            parts, before = table.parts[key], table.log_evidence[key].max()
-            others = [part for part in parts if part.component != self.outside]
-            own = [part for part in parts if part.component == self.outside]
-            for column, found in self.evaluate(columns, parts, {self.outside}).items():
-                gain = found.totals()[self.outside] - found.none + np.log(_ONE_MORE)
-                more = [*others, merged([*own, found.likeliest(self.outside)])]
-                noise = table.noises[column]
-                before_signs, signs = (
-                    log_sign_probability(self.problem, noise, each)
-                    for each in (parts, more)
-                )
-                gain += min(signs - before_signs, 0.0)
-                value = float(table.log_evidence[key][column] + gain)
-                table.put(key, column, value, lambda more=more: more)
-            if table.log_evidence[key].max() <= before:
-                return
-
-    def _refine(self, key: Names, columns: Sequence[int]) -> None:
-        """Evaluate each member of a pair beside the best item of the other one."""
-        members = {self.table.names.index(name) for name in key}
-        for part in [*self.table.parts[key]]:
-            if part.component != self.outside:
-                self._beside([part], columns, members - {part.component})
-
-    def _beside(
-        self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
-    ) -> None:
-        """Enter everything beside some parts.
-
-        Args:
-            parts: one component, or a pair whose evidence is in the table.
-            columns: indices of the models of the noise.
-            only: the components to enter; by default all.
-        """
-        table, problem = self.table, self.problem
-        key = tuple(sorted(table.names[part.component] for part in parts))
-        for column, found in self.evaluate(columns, parts, only).items():
-            noise = table.noises[column]
-            signs = log_sign_probability(problem, noise, parts)
-            gain = found.totals() - found.none
-            start = table.log_evidence[key][column]
-            if len(parts) == 1 and parts[0].place is not None:
-                start = self.found_alone[column].of_part(parts[0])
-            gain[[table.names.index(name) for name in key]] = -np.inf
-            for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
-                names = (*key, table.names[k])
-                many = len(names) - (OUTSIDE in names) > 2
-                if many:
-                    continue
-                both = [*parts, found.likeliest(int(k))]
-                change = log_sign_probability(problem, noise, both) - signs
-                value = float(start + gain[k] + min(change, 0.0))
-                table.put(names, column, value, lambda both=both: both)
+    stiffness = float(problem.base.stiffness) * (1.0 + deviation)
+    return {"noise_sd": noise_sd, "stiffness": stiffness}

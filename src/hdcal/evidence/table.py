@@ -12,10 +12,12 @@ from hdcal.evidence.parts import Part
 OUTSIDE = "outside"
 # Names of the components of a hypothesis on the mean reading, sorted; () is none.
 Names = tuple[str, ...]
-# Prior probabilities of none, of the remainder alone, of all effects beside it, of all
-# pairs, and of all pairs beside it. Single effects share what is left.
-_NONE, _REMAINDER, _BESIDE, _PAIRS, _PAIRS_BESIDE = 0.5, 0.1, 0.15, 0.03, 0.01
-_SINGLE = 1.0 - (_NONE + _REMAINDER + _BESIDE + _PAIRS + _PAIRS_BESIDE)
+# Prior probabilities of none, of the remainder alone, of all effects with it, of all
+# pairs, and of all pairs with it. Single effects share what is left. A larger share of
+# pairs makes true pairs more probable, and takes as much from effects with structure
+# outside the library: blind cases with both get worse.
+_NONE, _REMAINDER, _WITH_REMAINDER, _PAIRS, _PAIRS_WITH = 0.5, 0.1, 0.15, 0.03, 0.01
+_SINGLE = 1.0 - (_NONE + _REMAINDER + _WITH_REMAINDER + _PAIRS + _PAIRS_WITH)
 
 
 @dataclass
@@ -39,8 +41,8 @@ class EvidenceTable:
         effects = max(len(self.names) - 1, 1)
         pairs = max(effects * (effects - 1) // 2, 1)
         alone = (_NONE, _SINGLE / effects, _PAIRS / pairs)
-        beside = (_REMAINDER, _BESIDE / effects, _PAIRS_BESIDE / pairs)
-        shares = beside if OUTSIDE in key else alone
+        with_it = (_REMAINDER, _WITH_REMAINDER / effects, _PAIRS_WITH / pairs)
+        shares = with_it if OUTSIDE in key else alone
         return float(np.log(shares[len(key) - (OUTSIDE in key)]))
 
     def posterior(self, temperature: float = 1.0) -> dict[Names, np.ndarray]:
@@ -74,7 +76,7 @@ class EvidenceTable:
         return np.sum([*self.posterior().values()], axis=0)
 
     def likeliest_noise(self, key: Names) -> NoiseModel:
-        """Return the most probable model of the noise beside a hypothesis."""
+        """Return the most probable model of the noise for a hypothesis."""
         return self.noises[int(np.argmax(self.log_evidence[key]))]
 
     def put(
@@ -93,7 +95,7 @@ class EvidenceTable:
         row = self.log_evidence.setdefault(key, none)
         if value > row.max():
             self.parts[key] = parts()
-        row[column] = max(row[column], value)
+        row[column] = max(row[column], float(value))
 
     def add_noises(self, noises: list[NoiseModel]) -> None:
         """Add models of the noise, under which nothing is evaluated yet."""

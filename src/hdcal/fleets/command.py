@@ -1,6 +1,5 @@
 """`hdcal fleet`: many gears of one kind, and which of them are odd."""
 
-from functools import partial
 from typing import Any
 
 import click
@@ -91,10 +90,7 @@ def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **giv
 
 
 def read_gears(console: Console, scheduler: str | None, given: dict[str, Any]):
-    """Return the readings of DATA; the console collects what is wrong.
-
-    On a terminal it asks for what the gear file leaves open.
-    """
+    """Return the readings of DATA; the console collects what is wrong."""
     from hdcal.data.measurements.gear_files import gear_files
     from hdcal.data.tables.parquet_files import is_parquet
     from hdcal.fleets.reading.read_fleet import read_fleet
@@ -104,11 +100,4 @@ def read_gears(console: Console, scheduler: str | None, given: dict[str, Any]):
     if gear_files(given["data"]) or is_parquet(given["data"]):
         outside = ["sheet", "specimen"]
         console.wrong += options.without_meaning(outside, "a folder of gears")
-    read = partial(console.wrong.attempt, read_fleet, scheduler=scheduler)
-    readings = read(**given)
-    case = None if readings is None else readings.case
-    reading = options.asked_reading(console, case)
-    if reading is not None:
-        given["reading"] = reading
-        readings = read(**given)
-    return readings
+    return console.wrong.attempt(read_fleet, scheduler=scheduler, **given)

@@ -1,7 +1,6 @@
 """Which effects many gears have, and how frequent each one is."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,45 +9,42 @@ from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
 from hdcal.data.case import Case, require_force
-from hdcal.data.measurements.bad_gears import offer
+from hdcal.data.measurements.bad_gears import cause as fault
+from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.plausible import implausible
+from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.library import library_of
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings
 from hdcal.evidence.table import OUTSIDE
-from hdcal.fleets.reading.read_fleet import read_fleet
-from hdcal.fleets.reading.readings import FleetReadings
-from hdcal.fleets.reading.usable import usable
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
+from hdcal.report.item import Interval
 from hdcal.shared_causes.frequencies import Frequencies, sample_frequencies
-from hdcal.shared_causes.gear_evidence import (
-    NONE,
-    Weight,
-    gears_of,
-    unusable,
-    weigh_gear,
-)
-from hdcal.shared_causes.result import FleetCauses
-from hdcal.shared_causes.summary import fleet_causes
+from hdcal.shared_causes.gear_evidence import NONE, Weight, weigh_gear
+from hdcal.shared_causes.gears import read_gears, usable_gears, without_bad
+from hdcal.shared_causes.result import RARE, FleetCauses, GearCauses, SharedCause
+from hdcal.versions import versions
 
 # Number of gears that the prior of the frequencies counts as.
 _COUNTS = 1.0
 # Draws of each chain, and the most where similar causes mix slowly.
 _CHAINS, _DRAWS, _MOST_DRAWS = 4, 1500, 12_000
-# The mixing of smaller frequencies is not checked.
-_RARE = 0.01
-# What differs between runs and between gears is a question to the fleet.
+# Differences between runs and between gears are a question to the fleet.
 _OF_FLEETS = {"runs", "specimens"}
 _LOST = "start again"
+# Probability of the set of causes of a gear.
+_CREDIBLE = 0.9
+# Log odds that are substantial (Jeffreys, Theory of Probability, 1961).
+_SUBSTANTIAL = 0.5 * np.log(10.0)
 
 
 def causes(
     data: Any,
-    gear: Path | str | Mapping[str, Any] | None = None,
+    gear: Any = None,
     *,
     columns: Mapping[str, str] | None = None,
     library: Mapping[str, type[Effect]] | None = None,
@@ -58,20 +54,22 @@ def causes(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> FleetCauses:
-    """Say which effects many gears have, and how frequent each one is.
+    """Find which effects many gears have, and how frequent each one is.
 
-    The evidence of every gear is computed as `diagnose` does; from these evidences
-    follow the frequencies of causes, and from them the causes of each gear.
+    The evidence of each gear is computed as `diagnose` does, with free offsets of its
+    runs. The frequencies of causes follow from the evidence of all gears, and the
+    causes of each gear from both.
 
     Args:
-        data: readings of many gears, as `fleet` takes them; of Parquet 50,000 rows at
-            most.
-        gear: as in `read_case`, where no case is given.
-        columns: likewise.
+        data: readings of many gears: a case; a table or file as `read_case` takes it,
+            with a column `specimen`; or a folder with a file, or a folder, for each.
+        gear: gear file, or its content, as in `read_case`.
+        columns: as in `read_case`.
         library: effects to consider, by name; by default all of them.
         jobs: processes that share the gears.
-        scheduler: address of a Dask scheduler, whose workers share them instead.
-        skip_bad: leave out gears with a wrong row or with too few readings.
+        scheduler: address of a Dask scheduler, whose workers share the gears instead.
+        skip_bad: leave out gears with a wrong row, with too few readings, or whose
+            evidence fails.
         seed: of all random numbers.
         progress: called with (gears done, gears in all).
 
@@ -83,54 +81,29 @@ def causes(
         wrong += implausible("seed", seed)
         effects = wrong.attempt(library_of, library)
     assert effects is not None
-    readings = read_fleet(data, gear, columns=columns)
-    require_force(readings.case, "causes")
-    case, gears = usable_gears(readings, effects, skip_bad=skip_bad)
+    case = read_gears(data, gear, columns=columns, skip_bad=skip_bad)
+    require_force(case, "causes")
+    check_effect_priors(case, {**EFFECTS, **effects})
+    gears, left_out = usable_gears(case, skip_bad=skip_bad)
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
-    tasks = [(place, each, effects, seed) for place, each in enumerate(gears)]
+    tasks = [(index, each, effects, seed) for index, each in enumerate(gears)]
     if scheduler is None:
         weighed = run_all(weigh_gear, tasks, jobs, progress)
     else:
         weighed = list(completed_on_cluster(weigh_gear, iter(tasks), scheduler, _LOST))
-    weights = [weight for _, weight in sorted(weighed, key=lambda each: each[0])]
-    return _together(case, weights, [*effects], seed)
-
-
-def usable_gears(
-    readings: FleetReadings,
-    library: Mapping[str, type[Effect]] = EFFECTS,
-    *,
-    skip_bad: bool = False,
-) -> tuple[Case, list[Case]]:
-    """Return the gears that can be diagnosed, as one case and as a case each.
-
-    Args:
-        readings: of all gears.
-        library: effects to consider, by name.
-        skip_bad: leave out gears that cannot be diagnosed.
-
-    Raises:
-        InputError: there is a finding for each gear that cannot be used.
-    """
-    readings = usable(readings, skip_bad=skip_bad)
-    case, rows = readings.case, int(readings.sums.rows.sum())
-    if len(case.records.force) < rows:
-        words = f"only {len(case.records.force)} of {rows} rows fit into memory"
-        raise InputError([Finding(case.name, words, "Use fewer gears")])
-    check_effect_priors(case, {**EFFECTS, **library})
-    gears = gears_of(case)
-    bad = unusable(gears)
-    if bad and not skip_bad:
-        raise InputError([*bad.values(), offer(bad, len(gears))])
-    if bad:
-        case = readings.without(bad).case
-        gears = gears_of(case)
-    return case, gears
+    found = dict(weighed)
+    labels = [each.specimen_labels[0] for each in gears]
+    failed = {labels[k]: w for k, w in found.items() if isinstance(w, Finding)}
+    gears = without_bad(gears, failed, skip_bad=skip_bad)
+    weights = [found[k] for k in range(len(labels)) if labels[k] not in failed]
+    return _together(case, gears, weights, {**left_out, **failed}, [*effects], seed)
 
 
 def _together(
     case: Case,
+    gears: Sequence[Case],
     weights: Sequence[Mapping[str, Weight]],
+    left_out: Mapping[str, Finding],
     library: Sequence[str],
     seed: int,
 ) -> FleetCauses:
@@ -141,32 +114,61 @@ def _together(
     # Log odds are divided as in a diagnosis, where that calibrates probabilities.
     tempered = gain / TEMPERATURE
     alone = prior * np.exp(tempered - tempered.max(axis=1, keepdims=True))
+    alone /= alone.sum(axis=1, keepdims=True)
     drawn, checked = _sampled(tempered, prior.mean(axis=0), names, seed)
-    return fleet_causes(
-        case=case,
-        names=names,
-        drawn=drawn,
-        alone=alone / alone.sum(axis=1, keepdims=True),
-        gain=gain,
-        checks=mixing_checks(mixing(checked), _CHAINS),
-        library=library,
+    checks = mixing_checks(mixing(checked), _CHAINS)
+    reasons = tuple(check.words for check in checks if check.outcome == "failed")
+    confounded = _confounded(names, drawn.chance, alone)
+    sets = [_credible_set(names, row, confounded) for row in drawn.chance]
+    why = {gear: fault(finding) for gear, finding in left_out.items()}
+    words = [left_out_words(left_out, len(sets) + len(why))] if why else []
+    used = _rows(gears, names, sets, drawn.chance, alone, failed=bool(reasons))
+    unused = [GearCauses(gear=g, status=f"left out: {w}") for g, w in why.items()]
+    return FleetCauses(
+        part="part" if case.gear.theory == SPRING else "gear",
+        units=case.units,
+        reasons=reasons,
+        gears=len(gears),
+        rows=sum(len(each.records.force) for each in gears),
+        left_out=why,
+        causes=_shared(names, drawn, sets, gain),
+        not_shown=tuple(name for name in library if name not in names),
+        confounded=confounded,
+        notes=(*words, *case.notes),
         seed=seed,
+        draws=drawn.share[..., 0].size,
+        versions=versions(),
+        data_sha256=case.data_sha256,
+        each_gear=(*used, *unused),
+        checks=checks,
+        name=case.name,
     )
 
 
-def _sampled(
-    gain: np.ndarray, prior: np.ndarray, names: Sequence[str], seed: int
-) -> tuple[Frequencies, dict[str, np.ndarray]]:
-    """Return draws, more of them where chains mix slowly, and those to be checked."""
-    rng, draws = np.random.default_rng(seed), _DRAWS
-    counts = _COUNTS * prior / prior.sum()
-    while True:
-        drawn = sample_frequencies(gain, counts, rng, chains=_CHAINS, draws=draws)
-        common = drawn.share.mean(axis=(0, 1)) >= _RARE
-        checked = {n: drawn.share[..., k] for k, n in enumerate(names) if common[k]}
-        draws *= 2
-        if draws > _MOST_DRAWS or have_mixed(checked):
-            return drawn, checked
+def _rows(
+    gears: Sequence[Case],
+    names: Sequence[str],
+    sets: Sequence[tuple[str, ...]],
+    chance: np.ndarray,
+    alone: np.ndarray,
+    *,
+    failed: bool,
+) -> list[GearCauses]:
+    """Return the rows of gears.csv."""
+    return [
+        GearCauses(
+            gear=each.specimen_labels[0],
+            lot=each.lots[0] if each.lots else None,
+            rows=len(each.records.force),
+            causes=" / ".join(sets[k]),
+            probability=float(chance[k].max()),
+            probability_none=float(chance[k, names.index(NONE)]),
+            alone=names[int(alone[k].argmax())],
+            probability_alone=float(alone[k].max()),
+            status="failed" if failed else "ok",
+        )
+        for k, each in enumerate(gears)
+    ]
 
 
 def _tables(
@@ -183,3 +185,67 @@ def _tables(
             gain[gear, place] = each.log_evidence - weight[NONE].log_evidence
             prior[gear, place] = np.exp(each.log_prior)
     return gain, prior
+
+
+def _sampled(
+    gain: np.ndarray, prior: np.ndarray, names: Sequence[str], seed: int
+) -> tuple[Frequencies, dict[str, np.ndarray]]:
+    """Return draws, more where chains mix slowly, and the draws that are checked."""
+    rng, draws = np.random.default_rng(seed), _DRAWS
+    counts = _COUNTS * prior / prior.sum()
+    while True:
+        drawn = sample_frequencies(gain, counts, rng, chains=_CHAINS, draws=draws)
+        common = drawn.share.mean(axis=(0, 1)) >= RARE
+        checked = {n: drawn.share[..., k] for k, n in enumerate(names) if common[k]}
+        draws *= 2
+        if draws > _MOST_DRAWS or have_mixed(checked):
+            return drawn, checked
+
+
+def _shared(
+    names: Sequence[str],
+    drawn: Frequencies,
+    sets: Sequence[tuple[str, ...]],
+    gain: np.ndarray,
+) -> tuple[SharedCause, ...]:
+    """Return the causes over all gears, the most frequent first."""
+    share = drawn.share.reshape(-1, len(names))
+    cause = drawn.cause.reshape(len(share), -1)
+    return tuple(
+        SharedCause(
+            cause=names[k],
+            gears_named=sum(each == (names[k],) for each in sets),
+            gears=Interval.of(np.sum(cause == k, axis=1)),
+            share=Interval.of(share[:, k]),
+            log_evidence_nat=float(gain[:, k].sum()),
+        )
+        for k in map(int, np.argsort(-share.mean(axis=0), kind="stable"))
+    )
+
+
+def _confounded(
+    names: Sequence[str], chance: np.ndarray, alone: np.ndarray
+) -> tuple[str, ...]:
+    """Return effects that single gears do not separate from something outside."""
+    if OUTSIDE not in names:
+        return ()
+    log_alone = np.log(np.maximum(alone, np.finfo(float).tiny))
+    odds = log_alone - log_alone[:, [names.index(OUTSIDE)]]
+    likeliest = chance.argmax(axis=1)
+    return tuple(
+        names[k]
+        for k in map(int, np.unique(likeliest))
+        if names[k] not in (NONE, OUTSIDE)
+        and np.mean(odds[likeliest == k, k]) < _SUBSTANTIAL
+    )
+
+
+def _credible_set(
+    names: Sequence[str], chance: np.ndarray, confounded: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the fewest causes with the credible probability, most probable first."""
+    order = np.argsort(-chance, kind="stable")
+    many = 1 + int(np.sum(np.cumsum(chance[order]) < _CREDIBLE))
+    found = tuple(names[int(k)] for k in order[:many])
+    add = found[0] in confounded and OUTSIDE not in found
+    return (*found, OUTSIDE) if add else found

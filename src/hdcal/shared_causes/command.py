@@ -1,4 +1,4 @@
-"""`hdcal causes`: what many gears have in common."""
+"""`hdcal causes`: effects that many gears have in common."""
 
 import click
 
@@ -11,11 +11,11 @@ from hdcal.cli.options import (
     library_option,
     seed_option,
     skip_bad_option,
+    without_meaning,
 )
-from hdcal.fleets.command import read_gears
 
 
-@command(short_help="Many gears: which effects they have, and how often each one is.")
+@command(short_help="Many gears: which effects they have, and how frequent each is.")
 @case_options
 @library_option
 @click.option(
@@ -24,7 +24,7 @@ from hdcal.fleets.command import read_gears
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Dask scheduler whose workers weigh the gears instead.",
+    help="Dask scheduler whose workers share the gears instead.",
 )
 @skip_bad_option
 @seed_option
@@ -34,37 +34,35 @@ from hdcal.fleets.command import read_gears
 def causes(
     console: Console, out, force, seed, library, jobs, scheduler, skip_bad, **given
 ):
-    """Say which effects the gears in DATA have, and how often each one is.
+    """Find which effects the gears in DATA have, and how frequent each effect is.
 
-    DATA names the gear of each row in a column `specimen`, also called gear or serial.
+    DATA names the gear of each row in a column `specimen`, also called gear or serial;
+    or it is a folder with a file, or a folder, for each gear.
     """
     from hdcal.cli.progress import progress_bar
+    from hdcal.data.measurements.gear_files import gear_files
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
-    from hdcal.physics.registry import EFFECTS
+    from hdcal.shared_causes.gears import read_gears, usable_gears
 
     with console.wrong as wrong:
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
-        effects = wrong.attempt(choose_library, library, EFFECTS)
-        readings = read_gears(console, None, given)
-        if readings is not None:
-            from hdcal.shared_causes.causes import usable_gears
-
-            wrong.attempt(usable_gears, readings, skip_bad=skip_bad)
-            out = f"{readings.case.name}-causes" if out is None else out
+        effects = wrong.attempt(choose_library, library)
+        if gear_files(given["data"]):
+            wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
+            del given["sheet"], given["specimen"]
+        case = None
+        if given["columns"] is not None:
+            case = wrong.attempt(read_gears, **given, skip_bad=skip_bad)
+        if case is not None:
+            wrong.attempt(usable_gears, case, skip_bad=skip_bad)
+            out = f"{case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
-    assert readings is not None and effects is not None
+    assert case is not None and effects is not None
     from hdcal.shared_causes.causes import causes as shared_causes
 
+    asked = {"jobs": jobs, "scheduler": scheduler, "skip_bad": skip_bad, "seed": seed}
     with progress_bar("weighing") as progress:
-        found = shared_causes(
-            readings,
-            library=effects,
-            jobs=jobs,
-            scheduler=scheduler,
-            skip_bad=skip_bad,
-            seed=seed,
-            progress=progress,
-        )
+        found = shared_causes(case, library=effects, progress=progress, **asked)
     return console.show(found, tables={"gears.csv": found.to_frame()})

@@ -1,8 +1,8 @@
-"""How often causes are, and which one each gear has, from evidence gear by gear.
+"""Frequencies of causes, and the cause of each gear, from the evidence of each gear.
 
-Every gear has one cause, none among them; how often each one is is not known either.
-Frequencies and causes are drawn in turn. Lookalikes that trade places in all gears at
-once would be left only after very long: such exchanges are proposed beside that.
+Every gear has one cause, which may be none. Frequencies and causes are drawn in turn.
+Similar causes would change places in all gears at once only after very many draws:
+such exchanges are proposed in addition.
 
 Source:
     Diebolt and Robert, Journal of the Royal Statistical Society B 56 (1994), the
@@ -14,18 +14,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gammaln, softmax
 
-# Sweeps that are left out, and exchanges that are proposed at each one.
-_FORGOTTEN, _EXCHANGES = 500, 6
-# A frequency of next to nothing has no logarithm.
+# Sweeps that are left out, and exchanges that are proposed in each sweep.
+_WARMUP, _EXCHANGES = 500, 6
+# Keeps the logarithm of a frequency finite.
 _LEAST = 1e-300
 
 
 class Frequencies(NamedTuple):
-    """Draws of how often causes are, and what gears have.
+    """Draws of frequencies and causes.
 
     Attributes:
         share: of each cause among gears to come, shape (chain, draw, k).
-        cause: of each gear, as its place, shape (chain, draw, g).
+        cause: index of the cause of each gear, shape (chain, draw, g).
         chance: of each cause in each gear, given all gears, shape (g, k).
     """
 
@@ -47,10 +47,10 @@ def sample_frequencies(
     Args:
         log_likelihood: of each gear's readings by cause, up to a constant of the gear,
             shape (g, k).
-        counts: of Dirichlet's law, as if so many gears had been seen, shape (k,).
+        counts: of the Dirichlet prior, in gears, shape (k,).
         rng: source of randomness.
-        chains: independent ones.
-        draws: of each.
+        chains: number of independent chains.
+        draws: of each chain.
     """
     gears, causes = log_likelihood.shape
     cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)
@@ -58,13 +58,13 @@ def sample_frequencies(
     kept = np.empty((chains, draws, gears), np.int16)
     chance = np.zeros((gears, causes))
     each = np.arange(chains)[:, None]
-    for sweep in range(-_FORGOTTEN, draws):
+    for sweep in range(-_WARMUP, draws):
         for chain in cause:
             for _ in range(_EXCHANGES):
                 _exchange(chain, log_likelihood, counts, rng)
-        seen = np.zeros((chains, causes))
-        np.add.at(seen, (each, cause), 1.0)
-        drawn = rng.standard_gamma(counts + seen)
+        members = np.zeros((chains, causes))
+        np.add.at(members, (each, cause), 1.0)
+        drawn = rng.standard_gamma(counts + members)
         now = drawn / drawn.sum(axis=1, keepdims=True)
         log_joint = np.log(np.maximum(now, _LEAST))[:, None] + log_likelihood
         before, cause = cause, _drawn(log_joint, rng)
@@ -75,7 +75,7 @@ def sample_frequencies(
 
 
 def _drawn(log_weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return an index along the last axis, by the weights (Gumbel's trick)."""
+    """Return an index along the last axis, drawn by weight (Gumbel's method)."""
     return np.argmax(log_weight + rng.gumbel(size=log_weight.shape), axis=-1)
 
 
@@ -85,9 +85,9 @@ def _exchange(
     counts: np.ndarray,
     rng: np.random.Generator,
 ) -> None:
-    """Let the gears of two causes trade these, where that is probable enough.
+    """Exchange the gears of two causes with the Metropolis probability.
 
-    Frequencies are integrated out in it, so that they follow.
+    Frequencies are integrated out.
     """
     one, other = cause[rng.integers(len(cause))], rng.integers(len(counts))
     if one == other:

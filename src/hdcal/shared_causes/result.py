@@ -17,13 +17,12 @@ from hdcal.report.item import (
     Item,
     Probability,
     Words,
-    quantity,
 )
 from hdcal.report.result import Result
 from hdcal.report.words import label
 from hdcal.shared_causes.gear_evidence import NONE
 
-# Causes of a smaller share of gears are in the JSON answer alone.
+# Less frequent causes are in the JSON alone.
 RARE = 0.01
 
 
@@ -31,11 +30,11 @@ class SharedCause(Item):
     """One cause over all gears.
 
     Attributes:
-        cause: none, an effect by its name, or outside the library.
+        cause: none, the name of an effect, or outside the library.
         gears_named: gears in which it alone has a probability of 0.9 or more.
-        gears: of these, how many have it.
+        gears: number of these gears that have it.
         share: of gears to come that have it.
-        log_evidence_nat: of the readings of all gears, if each had it, over none.
+        log_evidence_nat: of the readings of all gears, if each has it, over none.
     """
 
     cause: EffectName
@@ -45,14 +44,6 @@ class SharedCause(Item):
     log_evidence_nat: float
 
 
-class LotCauses(Item):
-    """A lot, and how many of its gears have an effect or something outside."""
-
-    lot: Words
-    gears: Count
-    gears_with_effect: Interval
-
-
 class GearCauses(Item):
     """One gear: a row of gears.csv.
 
@@ -60,11 +51,11 @@ class GearCauses(Item):
         gear: its label.
         lot: empty if lots are not stated.
         rows: of the gear.
-        causes: the fewest that have a probability of 0.9, the likeliest first.
-        probability: of the likeliest cause, given all gears.
+        causes: the fewest with a probability of 0.9, the most probable first.
+        probability: of the most probable cause, given all gears.
         probability_none: that the gear has no effect.
-        alone: the likeliest cause by the readings of this gear alone.
-        probability_alone: of that one.
+        alone: the most probable cause by the readings of this gear alone.
+        probability_alone: of that cause.
         status: ok, failed, or why the gear is left out.
     """
 
@@ -72,8 +63,8 @@ class GearCauses(Item):
     lot: str | None = None
     rows: Count | None = None
     causes: str = ""
-    probability: Probability | None = quantity("probability", default=None)
-    probability_none: Probability | None = quantity("no effect", default=None)
+    probability: Probability | None = None
+    probability_none: Probability | None = None
     alone: str = ""
     probability_alone: Probability | None = None
     status: Words
@@ -86,14 +77,13 @@ class GearCauses(Item):
 
 
 class FleetCauses(Result):
-    """What `hdcal causes` answers; summary.json.
+    """Result of `hdcal causes`; summary.json.
 
     Attributes:
         gears: number of gears.
         rows: number of their rows.
-        left_out: gears in none of the numbers, each with the reason.
-        causes: those that were considered, the most frequent first.
-        lots: if they are stated.
+        left_out: reason for each gear that is in none of the numbers.
+        causes: that were considered, the most frequent first.
         not_shown: effects of the library without a prediction for any gear.
         confounded: causes that one gear alone does not separate from something outside
             the library, which many gears do not separate better.
@@ -110,13 +100,12 @@ class FleetCauses(Result):
     template = "shared_causes/report.md.j2"
     table = "each_gear"
 
-    format: Literal["hdcal.causes/2"] = "hdcal.causes/2"
+    format: Literal["hdcal.causes/3"] = "hdcal.causes/3"
     interval: float = INTERVAL
     gears: Count
     rows: Count
     left_out: dict[str, Words]
     causes: tuple[SharedCause, ...]
-    lots: tuple[LotCauses, ...]
     not_shown: tuple[EffectName, ...]
     confounded: tuple[EffectName, ...]
     notes: tuple[str, ...]
@@ -130,13 +119,13 @@ class FleetCauses(Result):
 
     @property
     def used(self) -> tuple[GearCauses, ...]:
-        """The gears that are not left out, those most surely with an effect first."""
+        """The gears that are not left out, the most probable effects first."""
         kept = [each for each in self.each_gear if each.probability_none is not None]
         return tuple(sorted(kept, key=lambda each: each.probability_none or 0.0))
 
     @property
     def kinds(self) -> dict[tuple[str, ...], list[str]]:
-        """Gears by the causes that they may have, the most frequent first."""
+        """Gears by their causes, the most frequent first."""
         found: dict[tuple[str, ...], list[str]] = {}
         for each in self.each_gear:
             if each.probability_none is not None:

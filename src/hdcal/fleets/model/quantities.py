@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
-from hdcal.evidence.linear_problem import moments, stiffness_prior
+from hdcal.evidence.base_model import moments, stiffness_prior
 from hdcal.fleets.model.gear_noise import GearNoise
 from hdcal.fleets.model.gear_quantity import GearQuantity, Noise
 from hdcal.fleets.model.groups import (

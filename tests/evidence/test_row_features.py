@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import NOISE, rich, simulated
 
-from hdcal.evidence.coarse_reading import coarse_step, with_coarse_step
+from hdcal.evidence.row_features import coarse_step, with_coarse_step
 
 
 def read(step: float, digits: int, scale: float = 1.0):

@@ -1,0 +1,118 @@
+"""The gears of a fleet, each as a case of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.full_scale import scale_of
+from hdcal.data.gear import at_full_scale
+from hdcal.data.measurements.bad_gears import offer
+from hdcal.data.measurements.folder import read_gear_folder
+from hdcal.data.measurements.gear_files import gear_files
+from hdcal.data.reading import read_case
+from hdcal.data.scatter import require_scatter
+from hdcal.errors import Finding, Findings, InputError, quoted
+from hdcal.evidence.row_features import take_rows
+
+# Frequencies of causes need several gears.
+_FEWEST = 3
+# Rows of a gear beyond those that its stiffness and the offsets of its runs use up.
+_FEWEST_LEFT = 8
+
+
+def read_gears(data: Any, gear: Any = None, **how: Any) -> Case:
+    """Return the readings of many gears.
+
+    Args:
+        data: a case; a table or file as `read_case` takes it, with a column `specimen`;
+            or a folder with a file, or a folder, for each gear.
+        gear: as in `read_case`.
+        how: further arguments of `read_case`, or of `read_gear_folder`.
+
+    Raises:
+        InputError: holds everything that is wrong with the data.
+    """
+    if isinstance(data, Case):
+        return data
+    if gear_files(data):
+        return read_gear_folder(data, gear, **how)[0]
+    return read_case(data, gear, **how)
+
+
+def usable_gears(case: Case, *, skip_bad: bool = False) -> tuple[list[Case], dict]:
+    """Return the gears whose readings can show a cause.
+
+    Args:
+        case: readings of all gears.
+        skip_bad: leave the other gears out.
+
+    Returns:
+        A case for each gear, and the finding on each gear that is left out.
+
+    Raises:
+        InputError: too few gears are left, or a gear cannot be used.
+    """
+    gears = [_one_gear(case, index) for index in range(len(case.specimen_labels))]
+    bad = {}
+    for gear in gears:
+        wrong = _unusable(gear)
+        bad |= {gear.specimen_labels[0]: wrong[0]} if wrong else {}
+    gears = without_bad(gears, bad, skip_bad=skip_bad)
+    return gears, {**case.left_out, **bad}
+
+
+def without_bad(
+    gears: Sequence[Case], bad: Mapping[str, Finding], *, skip_bad: bool
+) -> list[Case]:
+    """Return the gears that are not bad.
+
+    Raises:
+        InputError: a gear is bad and may not be left out, or too few are left.
+    """
+    left = [gear for gear in gears if gear.specimen_labels[0] not in bad]
+    if bad and not skip_bad:
+        raise InputError([*bad.values(), offer(bad, len(gears))])
+    if len(left) < _FEWEST:
+        words = f"{len(left)} of {len(gears)} gears can be used"
+        remedy = f"Frequencies of causes take {_FEWEST} or more gears, each named in a "
+        remedy += "column specimen"
+        raise InputError([*bad.values(), Finding("data", words, remedy)])
+    return left
+
+
+def _one_gear(case: Case, index: int) -> Case:
+    """Return the rows of one gear, with shipped priors at the scale of these rows."""
+    records = take_rows(case.records, np.flatnonzero(case.records.specimen == index))
+    kept, run = np.unique(records.run, return_inverse=True)
+    known = records.known - {"run", "runs", "specimen", "specimens"}
+    zeros = np.zeros(len(run), int)
+    force, read = np.asarray(records.force), np.asarray(records.deformation)
+    scale = scale_of(force, read, case.gear.reading)
+    return replace(
+        case,
+        name=f"{case.name}, gear {quoted(case.specimen_labels[index])}",
+        gear=at_full_scale(case.gear, scale),
+        records=replace(records, run=run, specimen=zeros, known=known),
+        run_labels=tuple(case.run_labels[each] for each in kept),
+        specimen_labels=(case.specimen_labels[index],),
+        lots=case.lots[index : index + 1],
+        operators=(),
+        rigs=(),
+        dates=(),
+    )
+
+
+def _unusable(gear: Case) -> Findings:
+    """Return why the readings of a gear cannot show a cause."""
+    wrong, rows, runs = Findings(), len(gear.records.force), len(gear.run_labels)
+    needed = _FEWEST_LEFT + 1 + runs
+    if rows < needed:
+        words = f"has {rows} rows in {runs} run{'s' if runs > 1 else ''}, too few"
+        remedy = f"Read it {needed} times or more, or leave it out"
+        wrong.append(Finding(gear.name, words, remedy))
+    else:
+        wrong.attempt(require_scatter, gear)
+    return wrong
