@@ -46,32 +46,6 @@ def test_a_matrix_of_a_mat_file(tmp_path):
         hdcal.read_case(tmp_path / "a.mat")
 
 
-def test_what_cannot_be_told_is_refused(tmp_path):
-    several = {"a": FORCE, "b": FORCE, "c": np.zeros(9), "d": np.zeros(9)}
-    savemat(tmp_path / "a.mat", several)
-    with pytest.raises(InputError, match="holds no one table of readings: 'a', 'b'"):
-        hdcal.read_case(tmp_path / "a.mat")
-    savemat(tmp_path / "b.mat", {"note": "nothing here"})
-    with pytest.raises(InputError, match="no arrays"):
-        hdcal.read_case(tmp_path / "b.mat")
-
-
-def test_what_is_not_read_of_a_mat_file_is_told(tmp_path):
-    held = {"deformation_mm": DEFORMATION, "force_N": FORCE, "run": ["a"] * 6}
-    savemat(tmp_path / "a.mat", {**held, "temperature_C": np.zeros(5)})
-    check(hdcal.read_case(tmp_path / "a.mat"), "not read of the file: 'run', 'temper")
-    runs = {"deformation_mm": DEFORMATION, "force_N": FORCE}
-    savemat(tmp_path / "b.mat", {"up": runs, "down": runs})
-    with pytest.raises(InputError, match="'deformation_mm', 'force_N' more than once"):
-        hdcal.read_case(tmp_path / "b.mat")
-
-
-def test_arrays_have_no_encoding(tmp_path):
-    FRAME.to_parquet(tmp_path / "a.parquet")
-    with pytest.raises(InputError, match="has no `encoding`"):
-        hdcal.read_case(tmp_path / "a.parquet", encoding="utf-8")
-
-
 @pytest.mark.parametrize("begins", [b"PAR1", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n"])
 def test_a_broken_one_is_refused_in_words(tmp_path, begins):
     (tmp_path / "a").write_bytes(begins + bytes(range(256)) * 4)

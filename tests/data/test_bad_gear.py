@@ -30,22 +30,14 @@ CASES = {
         GEAR.replace("0.68", "-1"),
         [(2, "gear.wall_thickness_mm", "-1 mm does not lie")],
     ),
-    "zero": (GEAR.replace("70.0", "0"), [(4, "gear.length_mm", "0 mm does not lie")]),
     "nan": (GEAR.replace("70.0", "nan"), [(4, "gear.length_mm", "finite")]),
-    "inf": (GEAR.replace("70.0", "inf"), [(4, "gear.length_mm", "")]),
     "text": (GEAR.replace("70.0", '"70"'), [(4, "gear.length_mm", "number")]),
-    "bool": (GEAR.replace("70.0", "true"), [(4, "gear.length_mm", "number")]),
-    "huge": (GEAR.replace("70.0", "1" + "0" * 400), [(4, "gear.length_mm", "")]),
     "metres": (GEAR.replace("70.0", "1e9"), [(4, "gear.length_mm", "does not lie")]),
     "material": (
         GEAR + 'material = "40CrNiMo"\n',
         [(5, "gear.material", "'40CrNiMoA'")],
     ),
     "material file": (GEAR + 'material = "my.toml"\n', [(None, None, "not exist")]),
-    "reserved": (
-        GEAR + 'material = "rig"\n',
-        [(5, "gear.material", "unknown material")],
-    ),
     "theory": (GEAR + 'theory = "cups"\n', [(5, "gear.theory", "'cup'")]),
     "load height": (
         GEAR + "load_height_mm = 71\n",
@@ -59,21 +51,11 @@ CASES = {
         GEAR + '[measurement]\ndeformation = "diameter"\n',
         [(6, "measurement.deformation", "'diametral'")],
     ),
-    "too cold": (
-        GEAR + "[measurement]\nreference_temperature_C = -300\n",
-        [(6, "measurement.reference_temperature_C", "absolute zero")],
-    ),
-    "resolution": (
-        GEAR + "[measurement]\nforce_resolution_N = 0\n",
-        [(6, "measurement.force_resolution_N", "0 N does not lie")],
-    ),
-    "gear is a number": ("gear = 3\n", [(1, "gear", "")]),
     "priors is a number": ("priors = 3\n" + GEAR, [(1, "priors", "")]),
     "prior unknown": (
         P + 'Eo = { family = "normal" }\n',
         [(6, "priors.Eo", "'E0'")],
     ),
-    "prior is a number": (P + "K = 2.0\n", [(6, "priors.K", "not a table")]),
     "no family": (P + "K = { median = 2 }\n", [(6, "priors.K.family", "is missing")]),
     "family": (
         P + 'K = { family = "log-normal", median = 2, log_sd = 1 }\n',
@@ -91,10 +73,6 @@ CASES = {
         P + 'force_offset = { family = "normal", mean = 0, sd = -1 }\n',
         [(6, "priors.force_offset.sd", "not positive")],
     ),
-    "number inf": (
-        P + 'force_offset = { family = "normal", mean = inf, sd = 1 }\n',
-        [(6, "priors.force_offset.mean", "finite")],
-    ),
     "low above high": (
         P + 'K = { family = "uniform", low = 3, high = 2 }\n',
         [(6, "priors.K.high", "not below")],
@@ -111,28 +89,15 @@ CASES = {
         P + 'E0 = { family = "normal", mean = 207, sd = 3, unit = "N" }\n',
         [(6, "priors.E0.unit", "does not measure")],
     ),
-    "no such unit": (
-        P + 'E0 = { family = "normal", mean = 207, sd = 3, unit = "GigaPa" }\n',
-        [(6, "priors.E0.unit", "not a unit")],
-    ),
     "unit is a sum": (
         P + 'E0 = { family = "normal", mean = 1, sd = 1, unit = "9**9**9**9" }\n',
         [(6, "priors.E0.unit", "not a unit")],
-    ),
-    "effect family": (
-        GEAR + "[priors.coulomb_friction]\nforce = { family = 'cauchy' }\n",
-        [(6, "priors.coulomb_friction.force.family", "unknown choice")],
     ),
     "effect unit": (
         GEAR + "[priors.slack]\nc = { family = 'half_normal', sd = 1, unit = 'mA' }\n",
         [(6, "priors.slack.c.unit", "is not a unit")],
     ),
-    "effect no table": (
-        GEAR + "[priors.slack]\nclearance = 3\n",
-        [(6, "priors.slack.clearance", "not a table")],
-    ),
     "duplicate key": (GEAR + "radius_mm = 3\n", [(5, None, "not TOML")]),
-    "syntax": (GEAR + "name = \n", [(5, None, "not TOML")]),
     "deep": (GEAR + "name = " + "[" * 5000, [(None, None, "not TOML")]),
     "four at once": (
         "[gear]\nwall_thicknes_mm = 1\nradius_mm = -4\nlength_mm = 70\n"
@@ -191,31 +156,3 @@ def test_table_and_gear_are_reported_together(folder):
 def test_theory_of_the_command_line(folder):
     with pytest.raises(InputError, match="Did you mean 'article'"):
         read_case(folder, theory="artikel")
-
-
-def test_two_thousand_unknown_keys_have_a_row_each(tmp_path):
-    path = tmp_path / "gear.toml"
-    path.write_text(GEAR + "".join(f"key_{i} = {i}\n" for i in range(2000)))
-    with pytest.raises(InputError) as caught:
-        read_gear(path)
-    found = {f.column: f.row for f in caught.value.findings}
-    assert found == {f"gear.key_{i}": 5 + i for i in range(2000)}
-
-
-@pytest.mark.parametrize(
-    ("gear", "keys"),
-    [
-        ({1: 2}, ["1"]),
-        ({"priors": {3: {"family": "fixed", "value": 1.0}}}, ["priors.3"]),
-        ({"gear": {None: 1, "radius_mm": 40.0}, 2.5: 0}, ["gear.None", "2.5"]),
-    ],
-)
-def test_keys_that_are_no_text_are_refused(gear, keys):
-    with pytest.raises(InputError) as caught:
-        read_case({"deformation_mm": range(6), "force_N": range(6)}, gear=gear)
-    assert [finding.column for finding in caught.value.findings] == keys
-
-
-def test_a_column_named_by_no_text_is_refused():
-    with pytest.raises(InputError):
-        read_case({"deformation_mm": range(6), "force_N": range(6)}, columns={1: "b"})

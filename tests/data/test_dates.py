@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from hdcal.data.measurements.dates import dates_of
-from hdcal.data.tables.cells import NOT_STATED
 
 
 @pytest.mark.parametrize(
@@ -23,18 +22,6 @@ from hdcal.data.tables.cells import NOT_STATED
 )
 def test_a_date_is_read(written, read):
     assert dates_of([written], np.array([0])) == ((read,), "")
-
-
-def test_a_mounting_has_its_first_date():
-    labels = ["2026-09-03", "2026-09-02", NOT_STATED, NOT_STATED]
-    dates, note = dates_of(labels, np.array([0, 0, 1, 0]))
-    assert dates == ("2026-09-02T00:00:00", "")
-    assert note == ""
-
-
-@pytest.mark.parametrize("labels", [[], [NOT_STATED, NOT_STATED]])
-def test_no_date_is_told_where_none_is_stated(labels):
-    assert dates_of(labels, np.arange(len(labels))) == ((), "")
 
 
 @pytest.mark.parametrize(

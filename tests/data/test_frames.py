@@ -105,36 +105,3 @@ def test_a_unit_against_its_header_is_told():
     case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
     assert case.records.force.max() == FRAME["Kraft [kN]"].max()
     assert any("in N, as was stated, though it names kN" in n for n in case.notes)
-
-
-def test_columns_are_named_in_a_mapping():
-    with pytest.raises(InputError, match="is no mapping"):
-        hdcal.read_case(FRAME, columns=["force=Kraft [kN]"])
-    plain = FRAME.rename(columns={"Kraft [kN]": "load cell 2 kN"})
-    case = hdcal.read_case(plain, columns={"force": "2[kN]"})
-    assert case.records.force.max() == 1000.0 * FRAME["Kraft [kN]"].max()
-
-
-def test_steel_is_assumed_aloud():
-    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
-    silent = hdcal.read_case(FRAME, sizes)
-    assert any("the gear is of steel" in note for note in silent.notes)
-    told = hdcal.read_case(FRAME, {**sizes, "material": "17-4PH"})
-    assert not any("the gear is of steel" in note for note in told.notes)
-
-
-def test_headers_of_several_levels_are_refused(folder):
-    stacked = pd.concat({"rig": FRAME}, axis=1)
-    with pytest.raises(InputError, match="columns of several levels"):
-        hdcal.read_case(stacked, folder / "gear.toml")
-
-
-def test_a_case_returns_to_the_table_it_was_read_from(folder):
-    """What `to_frame` gives is read as the same case again."""
-    case = hdcal.read_case(FRAME, folder / "gear.toml")
-    again = hdcal.read_case(case.to_frame(), folder / "gear.toml")
-    assert again.run_labels == case.run_labels
-    for name in ("deformation", "force", "time", "run", "sense", "force_sd"):
-        np.testing.assert_array_equal(
-            getattr(again.records, name), getattr(case.records, name)
-        )

@@ -18,7 +18,6 @@ MOUNTED = [
     ("A", "2026-10-12", "south", "Ana"),
 ]
 NAMES = ("specimen", "date", "rig", "operator")
-TOLD = "without a column `run`"
 
 
 def table(mounted=MOUNTED, names=NAMES) -> pd.DataFrame:
@@ -30,10 +29,6 @@ def table(mounted=MOUNTED, names=NAMES) -> pd.DataFrame:
         for place, labels in enumerate(mounted)
     ]
     return pd.concat(parts, ignore_index=True)
-
-
-def notes(case) -> list[str]:
-    return [note for note in case.notes if TOLD in note]
 
 
 def labels_of(gear: str, **told: str) -> list[str] | None:
@@ -71,41 +66,6 @@ def test_they_are_those_of_a_column_run():
     assert (case.dates, case.rigs) == (other.dates, other.rigs)
 
 
-def test_it_is_said_once():
-    (note,) = notes(read_case(table()))
-    assert note == (
-        "ASSUMED: without a column `run`, rows of a gear that differ in date, rig or "
-        "operator are of different mountings: 5 mountings of 3 gears. If not, name the "
-        "mountings in a column `run`"
-    )
-    rows = table([("A", "Ana"), ("A", "Ben")], ("serial", "inspector"))
-    (note,) = notes(read_case(rows))
-    assert "rows of a gear that differ in operator are" in note
-    assert "2 mountings of 1 gear." in note
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        table().assign(run=1),
-        table(MOUNTED[1:4]),
-        table().drop(columns=["date", "rig"]),
-        table().drop(columns=["date", "rig", "operator"]),
-    ],
-)
-def test_nothing_is_said_where_nothing_changes(rows):
-    case = read_case(rows)
-    assert not notes(case)
-    assert len(case.run_labels) == len(case.specimen_labels)
-
-
-def test_one_gear_of_several_has_its_mountings():
-    case = read_case(table(), specimen="A")
-    assert case.records.run.tolist() == np.repeat(range(3), 5).tolist()
-    assert case.run_labels[1] == "2026-10-12 north"
-    assert "3 mountings of 1 gear." in notes(case)[0]
-
-
 def test_only_the_day_of_a_time_stamp_counts(tmp_path):
     rows = table(MOUNTED[:4])
     minutes = pd.to_timedelta(7 * rows.index, unit="min")
@@ -118,11 +78,6 @@ def test_only_the_day_of_a_time_stamp_counts(tmp_path):
         assert np.array_equal(case.records.run, read_case(rows).records.run)
 
 
-def test_time_may_restart_in_each_mounting():
-    rows = table(MOUNTED[:4]).assign(time_s=np.tile(10.0 * X, 4))
-    assert len(read_case(rows).run_labels) == 4
-
-
 def test_rows_of_mountings_need_not_stand_together():
     rows = table(MOUNTED[:2]).sample(frac=1.0, random_state=2)
     case = read_case(rows)
@@ -133,15 +88,13 @@ def test_rows_of_mountings_need_not_stand_together():
 @pytest.mark.parametrize(
     ("told", "labels"),
     [
-        # The latest that fits: of the same gear, and of no other.
-        ({"rig": "s nn ", "gear": "AAAAA"}, ["s", "s", "n", "n", "s"]),
+        # That of the row above: of the same gear, and of no other.
+        ({"rig": "s nn ", "gear": "AAAAA"}, ["s", "s", "n", "n", "n"]),
         ({"rig": "sn  ", "gear": "AAAB"}, ["s", "n", "n", NOT_STATED]),
         # One below tells it too.
         ({"rig": " sn", "gear": "AAA"}, ["s", "s", "n"]),
         # Two halves are a whole, which a third row fits.
         ({"rig": "s s", "operator": " KK", "gear": "AAA"}, None),
-        # What one column leaves open another tells.
-        ({"rig": "sn ", "operator": "KMK", "gear": "AAA"}, ["s K", "n M", "s K"]),
         ({"rig": "ss ", "operator": "KMB", "gear": "AAA"}, ["K", "M", "B"]),
     ],
 )
@@ -158,23 +111,6 @@ def test_dates_that_cannot_be_read_tell_none_apart():
     # One that is misspelt is that of the rows above.
     days = [*rows["date"][:9], "2026-1o-12"]
     assert read_case(rows.assign(date=days)).records.run.tolist() == [0] * 5 + [1] * 5
-
-
-def test_several_rigs_of_one_gear_are_warned_of():
-    """What calibrates or diagnoses it has no gains of rigs; a fleet has."""
-    rows = table()
-    alone = read_case(rows[rows["specimen"] == "A"])
-    assert sum("2 rigs read this gear" in note for note in alone.notes) == 1
-    for other in (rows, rows[rows["specimen"] == "B"]):
-        assert not any("rigs read this gear" in n for n in read_case(other).notes)
-
-
-def test_labels_that_join_alike_are_of_two_mountings():
-    labels = [("A", "A B", "C"), ("A", "A", "B C")]
-    names = ("specimen", "rig", "operator")
-    case = read_case(table(labels, names))
-    assert case.run_labels == ("A B C", "A B C (2)")
-    assert (case.rigs, case.operators) == (("A B", "A"), ("C", "B C"))
 
 
 def test_days_of_other_clocks():

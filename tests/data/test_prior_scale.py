@@ -8,8 +8,6 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
-from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.usable import usable
 
 GEAR = """\
 [gear]
@@ -75,25 +73,6 @@ def test_a_case_takes_them_from_its_largest_readings(tmp_path):
     assert gear.effect_priors["coulomb_friction.force"].numbers == (7.0,)
 
 
-def test_gears_that_are_left_out_have_no_part_in_it():
-    x = np.tile(np.linspace(0.1, 0.5, 5), 6)
-    name = np.repeat(list("ABCDEF"), 5)
-    force = 200.0 * x + np.random.default_rng(1).normal(0.0, 0.2, len(x))
-    frame = {"specimen": name, "deformation_mm": x, "force_N": force}
-    still = frame | {
-        "deformation_mm": np.where(name == "B", 5.0, x),
-        "force_N": np.where(name == "B", 4000.0, force),
-    }
-    others = {header: column[name != "B"] for header, column in frame.items()}
-    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
-    read = read_fleet(still, sizes)
-    assert read.case.gear.full_scale.force > 3900.0
-    left, alone = usable(read, skip_bad=True)[0], read_fleet(others, sizes)
-    assert left.case.gear == alone.case.gear
-    whole = read_fleet(frame, sizes)
-    assert usable(whole)[0].case.gear == whole.case.gear
-
-
 def test_a_zero_that_nobody_states_may_be_anywhere():
     x = np.linspace(100.0, 101.0, 20)
     gear = read_case({"deformation_mm": x, "force_N": 5.0 * x}, gear=SPRING).gear
@@ -104,11 +83,3 @@ def test_a_zero_that_nobody_states_may_be_anywhere():
     assert zero == pytest.approx((0.0, 10.0 * (5.0 + 502.5 + 502.5)), rel=0.02)
     assert gear.full_scale.force == pytest.approx(5.0, rel=0.02)
     assert gear.full_scale.deformation == pytest.approx(1.0, rel=0.02)
-
-
-def test_a_zero_that_the_gear_file_states_stays():
-    stated = {"force_offset": {"family": "normal", "mean": 1.0, "sd": 0.2, "unit": "N"}}
-    x = np.linspace(0.0, 1.0, 20)
-    gear = {**SPRING, "priors": stated}
-    found = read_case({"deformation_mm": x, "force_N": 5.0 * x}, gear=gear).gear
-    assert found.priors["force_offset"].numbers == (1.0, 0.2)

@@ -7,13 +7,8 @@ import pytest
 from hdcal.data.gear import read_gear
 from hdcal.data.prior import FAMILIES
 from hdcal.data.priors import (
-    MODEL_UNITS,
-    SCALE_UNITS,
-    SPRING_UNITS,
-    effect_priors,
     material_names,
     material_priors,
-    rig_priors,
 )
 from hdcal.errors import InputError
 
@@ -41,21 +36,6 @@ def test_a_material_is_plausible(name):
     for prior in found.values():
         assert prior.source.endswith("handbook value, deliberately wide")
         assert len(prior.numbers) == len(FAMILIES[prior.family])
-
-
-def test_the_rig():
-    found = rig_priors()
-    shipped = MODEL_UNITS | SCALE_UNITS | SPRING_UNITS
-    assert set(found) == set(shipped) - {"E0", "alpha"}
-    assert found["K"].numbers == (2.0, 0.46)
-    assert all(prior.source for prior in found.values())
-
-
-def test_the_effects():
-    found = effect_priors()
-    assert found["outliers.fraction"].numbers == (1.0, 13.0)
-    assert found["thermal_zero_drift.slope"].unit == "N/K"
-    assert all(prior.source.startswith("typical size: ") for prior in found.values())
 
 
 CORRELATION = "[priors]\nnoise_correlation = {{ {} }}\n"

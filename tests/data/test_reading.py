@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.tables.headers import parse_header
 
 ROWS = [(0.0, 1.5), (0.1, 20.0), (0.2, 41.25), (0.3, 60.5), (0.4, 82.0), (0.5, 101.0)]
 
@@ -160,41 +159,6 @@ def test_a_mapping_wins_over_a_name(folder):
     assert case.notes == ("columns not used: 'force_N'",)
 
 
-def test_notes_name_what_was_left_out(folder):
-    content = "deformation_mm,force_N,weather\n" + "".join(
-        f"{i / 10},{i}.98,dry\n\n" for i in range(6)
-    )
-    gear = folder / "gear.toml"
-    gear.write_text(gear.read_text() + "force_resolution_N = 0.98\n")
-    notes = read(folder, content).notes
-    assert notes == (
-        "columns not used: 'weather'",
-        "5 empty lines between the readings were skipped",
-        "5 of 6 forces are not multiples of 0.98 N",
-    )
-
-
-def test_a_gear_file_that_was_not_named_is(folder):
-    rows = "".join(f"{i / 10},{i}\n" for i in range(6))
-    (folder / "readings.csv").write_text(f"deformation_mm,force_N\n{rows}")
-    (folder / "data.csv").write_text(f"deformation_mm,force_N\n{rows}")
-    beside = read_case(folder / "readings.csv")
-    assert beside.notes == ("the gear file is the gear.toml beside the data",)
-    assert read_case(folder / "readings.csv", folder / "gear.toml").notes == ()
-    assert read_case(folder).notes == ()
-
-
-@pytest.mark.parametrize(("wall", "told"), [("0.68", False), ("6.8", True)])
-def test_a_wall_that_is_not_thin_is_noted(folder, wall, told):
-    gear = folder / "gear.toml"
-    line = "wall_thickness_mm = "
-    before = gear.read_text("utf-8")
-    assert f"{line}0.68\n" in before
-    gear.write_text(before.replace(f"{line}0.68", f"{line}{wall}"), "utf-8")
-    notes = read(folder, text()).notes
-    assert any("is not thin" in note for note in notes) == told
-
-
 def test_a_note_names_the_first_rows_of_new_ramps(folder):
     ramp = "".join(f"{i / 20},{2 * i}\n" for i in range(1, 7))
     case = read(folder, f"deformation_mm,force_N\n{ramp * 2}")
@@ -264,42 +228,3 @@ def test_lots_are_those_of_gears_and_operators_those_of_mountings(folder):
     assert case.operators == ("Kern", "Moss", "Kern")
     # A number that stays the same is no force, whatever Charge means in French.
     assert case.records.force[-1] == 23.0
-
-
-def test_lots_of_which_a_gear_has_several_are_not_used(folder):
-    mixed = LOTS.replace("A,9,L1,Moss,2,0.2", "A,9,L2,Kern,2,0.2")
-    case = read(folder, mixed)
-    assert (case.lots, case.operators) == ((), ())
-    assert "lots are not used: specimen 'A' has several" in case.notes
-    assert "operators are not used: run 'A/2' has several" in case.notes
-
-
-def test_rigs_are_those_of_mountings(folder):
-    """Whatever their column is called; a rig that warms up is none."""
-    for header in ("rig", "Bench", "Prüfstand Nr"):
-        case = read(folder, LOTS.replace("Bediener", header))
-        assert (case.rigs, case.operators) == (("Kern", "Moss", "Kern"), ())
-    mixed = LOTS.replace("Bediener", "rig").replace("Moss,2,0.2", "Kern,2,0.2")
-    case = read(folder, mixed)
-    assert case.rigs == ()
-    assert "rigs are not used: run 'A/2' has several" in case.notes
-    header = parse_header("Rig temperature [C]")
-    assert (header.quantity, header.unit_text) == ("temperature", "C")
-
-
-def test_who_tested_may_stand_above_the_table_too(folder):
-    above = "Operator,Moss\nLot,L3\ndeformation_mm,force_N\n"
-    case = read(folder, above + "".join(f"{i / 10},{20 * i}\n" for i in range(6)))
-    assert len(case.records.force) == 6 and case.operators == ()
-
-
-def test_an_empty_lot_is_filled_by_the_others_of_its_gear(folder):
-    case = read(folder, LOTS.replace("A,9,L1,Moss,2,0.2", "A,9,,Moss,2,0.2"))
-    assert case.lots == ("L1", "not stated")
-    assert not any("several" in note for note in case.notes)
-
-
-def test_who_stands_beside_a_gauge_does_not_name_what_it_reads(folder):
-    header = "deformation_mm,Operator force [N]\n"
-    case = read(folder, header + "".join(f"{i / 10},{20 * i}\n" for i in range(6)))
-    assert case.records.force[2] == 40.0 and case.operators == ()

@@ -35,11 +35,6 @@ def correlation_of(folder, text, header="deformation_mm,force_N,time_s", step=0.
     return read_case(folder).gear.scale_priors["noise_correlation"]
 
 
-def test_without_facts_nothing_is_said(tmp_path):
-    assert gear_of(tmp_path, SPRING).effect_priors == {}
-    assert gear_of(tmp_path, SPRING + "[rig]\n").effect_priors == {}
-
-
 @pytest.mark.parametrize(("reading", "radial"), [("radial", 1.0), ("diametral", 0.5)])
 def test_each_fact_sharpens_its_own_prior(tmp_path, reading, radial):
     measured = f'[measurement]\ndeformation = "{reading}"\n'
@@ -77,12 +72,6 @@ def test_noise_behind_a_filter_errs_alike_as_the_prior_expects(tmp_path):
     likely = np.exp(-2 * np.pi * 2.0 * 0.05)
     assert seen == pytest.approx(likely, abs=0.03)
     assert a / (a + b) == pytest.approx(likely, abs=0.06)
-
-
-def test_a_filter_that_is_faster_than_the_logger_says_little(tmp_path):
-    slow = correlation_of(tmp_path, SPRING + FACTS, step=2.0)
-    assert slow.family == "beta"
-    np.testing.assert_allclose(slow.numbers, (0.5, 1.5), atol=1e-3)
 
 
 def test_without_a_clock_a_filter_says_nothing(tmp_path):

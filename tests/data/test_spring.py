@@ -1,19 +1,15 @@
 """A spring: the theory without sizes, whose K is the stiffness itself."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from hdcal.data.full_scale import FullScale
 from hdcal.data.gear import NO_MATERIAL, at_full_scale, read_gear
-from hdcal.data.priors import material_priors, rig_priors
+from hdcal.data.priors import rig_priors
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
-from hdcal.inference.posterior_tree import data_groups, describe_case, restore_case
-from hdcal.inference.problem import build_problem, influence_prior
 
 SPRING = '[gear]\ntheory = "spring"\n'
 SIZES = "wall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70.0\n"
@@ -59,14 +55,6 @@ def test_no_sizes_are_needed(read):
     assert gear.priors["K"] == shipped["spring_stiffness"]
 
 
-def test_sizes_may_be_there(read):
-    gear = read(SPRING + SIZES + 'material = "steel"\n')
-    assert gear.reach == gear.geometry.radius == 40.0
-    assert gear.priors["alpha"] == material_priors("steel")["alpha"]
-    assert gear.priors["E0"].numbers == (1.0,)
-    assert gear.density is not None
-
-
 def test_other_theories_need_sizes(read):
     lacking = [f"gear.{name}_mm" for name in ("wall_thickness", "radius", "length")]
     for text, theory in (("[gear]\n", None), (SPRING, "cup")):
@@ -100,17 +88,6 @@ def test_the_stiffness_keeps_to_its_range(read, scale):
     assert 1e-12 <= middle <= 1e12
 
 
-def test_K_of_a_theory_says_nothing_of_a_spring(read):
-    ring = '[priors]\nK = { family = "lognormal", median = 2.0, log_sd = 0.4 }\n'
-    for text, theory in (
-        ("[gear]\n" + SIZES + ring, "spring"),
-        (SPRING + SIZES + "[priors]\n" + STIFF, "ring"),
-    ):
-        with pytest.raises(InputError) as error:
-            read(text, theory=theory)
-        assert "priors.K" in [column for column, _ in findings(error)]
-
-
 def test_a_spring_has_no_modulus(read):
     with pytest.raises(InputError) as error:
         read(
@@ -120,20 +97,3 @@ def test_a_spring_has_no_modulus(read):
     ((column, problem),) = findings(error)
     assert column == "priors.E0"
     assert "has no meaning" in problem
-
-
-def test_a_case_read_as_a_spring_stays_one(rig):
-    problem = build_problem(rig, {})
-    assert float(problem.unit_stiffness) == 1.0
-    with pytest.raises(InputError, match="no K of 'ring'"):
-        influence_prior(rig, "ring")
-
-
-def test_it_is_held_in_a_posterior_file(rig):
-    text = describe_case(rig)
-    assert "NaN" not in text
-    back = restore_case(text, xr.DataTree.from_dict(data_groups(rig.records)))
-    assert math.isnan(back.gear.geometry.radius)
-    assert replace(back.gear, geometry=None, source={}) == replace(
-        rig.gear, geometry=None, source={}
-    )

@@ -61,20 +61,6 @@ def test_of_two_tables_one_has_to_be_named(folder):
         read(path, folder, sheet="third")
 
 
-def test_the_ending_of_its_name_does_not_matter(folder):
-    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
-    path.replace(folder / "data.csv")
-    assert len(read_case(folder).records.force) == len(READINGS)
-
-
-def test_what_another_kind_of_file_has_is_not_passed_over(folder):
-    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
-    with pytest.raises(InputError, match="no `encoding`"):
-        read(path, folder, encoding="cp1252")
-    with pytest.raises(InputError, match="no `sheet`"):
-        read_case(folder, sheet="only")
-
-
 def test_a_workbook_without_readings_is_refused(folder):
     path = book(folder, notes=[("nothing", "here")])
     with pytest.raises(InputError, match="no sheet holds a table"):
@@ -132,13 +118,6 @@ def test_of_joined_sheets_a_finding_names_sheet_and_row(folder):
         read(path, folder, sheet="Probe*")
 
 
-def test_sheets_of_other_columns_are_not_joined(folder):
-    other = [("Weg", "Kraft"), ("mm", "N"), *READINGS]
-    path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": other})
-    with pytest.raises(InputError, match="'Probe 1' and 'Probe 2' have other columns"):
-        read(path, folder, sheet="Probe*")
-
-
 def test_only_a_sheet_of_commas_alone_gets_points(folder):
     """Beside 0.5 a text of "1,234" may be a thousand: that is told, not decided."""
     head = [("deformation_mm", "force_N")]
@@ -146,39 +125,6 @@ def test_only_a_sheet_of_commas_alone_gets_points(folder):
     path = book(folder, **{"Probe 1": [*head, *READINGS], "Probe 2": [*head, *mixed]})
     with pytest.raises(InputError, match="1,234"):
         read(path, folder, sheet="Probe*")
-
-
-def test_a_sheet_of_few_readings_is_said_to_be_left_out(folder):
-    sheets = {"P 1": [*HEAD, *READINGS], "P 2": [*HEAD, *READINGS[:4]]}
-    case = read(book(folder, **sheets), folder, sheet="P*")
-    assert any("left out, as too few readings: 'P 2'" in note for note in case.notes)
-
-
-def test_labels_of_joined_sheets_keep_their_commas(folder):
-    head = [("deformation_mm", "force_N", "run")]
-    points = [(x, f, "1,2") for x, f in READINGS]
-    commas = [(*(str(v).replace(".", ",") for v in pair), "1,2") for pair in READINGS]
-    sheets = {"P 1": [*head, *points], "P 2": [*head, *commas]}
-    case = read(book(folder, **sheets), folder, sheet="P*")
-    assert case.run_labels == ("P 1/1,2", "P 2/1,2")
-
-
-def test_headers_again_begin_another_run_in_joined_sheets_too(folder):
-    twice = [*HEAD[:1], *READINGS, *HEAD[:1], *READINGS]
-    alone = [("deformation_mm", "force_N") if r == HEAD[0] else r for r in twice]
-    path = book(folder, **{"P 1": alone, "P 2": alone})
-    exact = read(path, folder, sheet="P 1")
-    assert len(exact.run_labels) == 2
-    joined = read(path, folder, sheet="P*")
-    assert len(joined.records.force) == 4 * len(READINGS)
-    assert len(joined.specimen_labels) == 2
-
-
-def test_a_sheet_that_names_specimens_itself_is_not_joined(folder):
-    rows = [("deformation_mm", "force_N", "specimen"), *((*r, "a") for r in READINGS)]
-    path = book(folder, **{"P 1": rows, "P 2": rows})
-    with pytest.raises(InputError, match="'P 1' names specimens itself"):
-        read(path, folder, sheet="P*")
 
 
 def test_texts_with_commas_beside_numbers_are_decimal_where_they_can_be_no_other(

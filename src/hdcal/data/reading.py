@@ -10,6 +10,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.gear import read_gear, unsized
 from hdcal.data.measurements.case_of import case_of
 from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME, file_of_gear
+from hdcal.data.measurements.joining import read_sheets
 from hdcal.data.measurements.measurements import of_specimen, read_measurements
 from hdcal.data.measurements.notes import ASSUMED
 from hdcal.data.measurements.screened import asked_range
@@ -85,14 +86,16 @@ def read_case(
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
-        asked = (theory, material, reading)
-        described = of_gear.attempt(gear_of, gear, nearby, folder, asked)
+        how_read = (theory, material, reading)
+        described = of_gear.attempt(gear_of, gear, nearby, folder, how_read)
         known = None if described is None else described[0]
         named = columns if known is None else known.source.get("columns", {}) | columns
-        how: dict = {"gear": known, "skip_bad": skip_bad}
-        measured = wrong.attempt(
-            read_measurements, table, named, encoding, sheet, **how
-        )
+        if sheet is not None and "*" in sheet:
+            asked = (table, named, sheet, known, skip_bad)
+            measured = wrong.attempt(read_sheets, *asked)
+        else:
+            how: dict = {"sheet": sheet, "gear": known, "skip_bad": skip_bad}
+            measured = wrong.attempt(read_measurements, table, named, encoding, **how)
         wrong += of_gear
         alone = own != path and measured is not None and len(measured.gears[1]) == 1
         if measured is not None and specimen is not None and not alone:

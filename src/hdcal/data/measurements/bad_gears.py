@@ -26,7 +26,7 @@ def bad_gears(
     for place in places:
         label = str(gears[place])
         if label and label not in bad:
-            bad[label] = findings.of_row(int(rows[place]))
+            bad[label] = findings.rows[int(rows[place])]
     return bad
 
 

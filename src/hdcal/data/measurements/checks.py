@@ -9,8 +9,8 @@ from hdcal.data.case import Gear
 from hdcal.data.findings import FileFindings
 from hdcal.data.plausible import RANGES
 from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import DIMENSIONS
-from hdcal.data.tables.named_columns import Column
 
 FEWEST_ROWS = 5
 # Kelvin become degrees Celsius with an error of rounding.

@@ -1,8 +1,6 @@
 """A folder with a file, or a folder, for each gear."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +16,17 @@ from hdcal.data.measurements.gear_files import (
     gear_labels,
     not_read,
 )
+from hdcal.data.measurements.joining import joined as joined
+from hdcal.data.measurements.joining import labelled
 from hdcal.data.measurements.measurements import Measurements, read_measurements
 from hdcal.data.reading import asked_columns, gear_of
-from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
 
-# First parts of the dotted keys that may differ between the files of gears of one kind.
-_OWN = ("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm")
-_OWN += ("gear.load_height_mm", "gear.name", "gear.nominal_deformation_mm", "columns.")
+# What may differ between the gear files of gears of one kind.
+_OWN = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm", "name")
+_OWN += ("nominal_deformation_mm",)
 _SIZES = ("wall_thickness", "radius", "length", "load_height")
 # What one file holds, its specimens named, and its gear; None where it has none.
 _Part = tuple[Measurements, Gear | None]
@@ -95,7 +94,7 @@ def read_gear_folder(
             if each:
                 unread[label] = each
             elif measured is not None:
-                parts.append((_labelled(measured, label), its))
+                parts.append((labelled(measured, label), its))
         wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert common is not None
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
@@ -108,52 +107,6 @@ def read_gear_folder(
     name = folder.resolve().name
     case = case_of(whole, common, (*about, *notes), name, range, skip_bad)
     return case, _sizes(parts) if own and common.theory != SPRING else None
-
-
-def _labelled(measured: Measurements, label: str) -> Measurements:
-    """Return measurements with the gear of each row, and the file in its row's name.
-
-    A gear of two files was mounted for each of them.
-    """
-    frame = measured.frame.set_axis([f"{row} of {label}" for row in measured.rows])
-    if "specimen" not in measured.stated:
-        frame = frame.assign(specimen=label)
-    else:
-        runs = frame["run"].cat.rename_categories(lambda run: f"{label} {run}".strip())
-        frame = frame.assign(run=runs)
-    return replace(measured, frame=frame)
-
-
-def joined(
-    parts: Sequence[Measurements], warm: float, bad: Mapping[str, Finding]
-) -> Measurements:
-    """Return the rows of all parts below each other.
-
-    Args:
-        parts: the first one names the whole.
-        warm: temperature of those that state none [°C].
-        bad: gears that are not among them, in addition to those of the parts.
-    """
-    blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
-    frames = [part.frame for part in parts]
-    names = dict.fromkeys(name for frame in frames for name in frame)
-    kept = [n for n in names if n in blank or all(n in frame for frame in frames)]
-    frames = [
-        frame.assign(**{n: blank[n] for n in kept if n not in frame})[kept]
-        for frame in frames
-    ]
-    labels = dict.fromkeys(("specimen", "run"), str)
-    whole: Any = pd.concat([frame.astype(labels) for frame in frames])
-    left_out = {gear: why for part in parts for gear, why in part.left_out.items()}
-    hashes = "".join(part.sha256 for part in parts)
-    return replace(
-        parts[0],
-        frame=whole.astype(dict.fromkeys(labels, "category")),
-        sha256=hashlib.sha256(hashes.encode()).hexdigest(),
-        stated=frozenset().union(*(part.stated for part in parts)),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
-        left_out={**bad, **left_out},
-    )
 
 
 def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
@@ -188,30 +141,24 @@ def _why(first: Finding, folder: Path) -> Finding:
 
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
-    """Yield differences of a gear file from that of all gears, but for sizes."""
-    mine, theirs = (dict(_flat(each.source)) for each in (one, other))
+    """Yield the tables in which a gear file differs from that of all gears."""
     remedy = "Gears of one kind differ in their sizes only"
-    keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
-    keys = [key for key in keys if mine.get(key) != theirs.get(key)]
-    for key in keys:
-        here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
-        words = f"is {here}, and {there} in {base}"
-        yield Finding(str(file), words, remedy, None, key)
-    priors = [
-        {n: (p.family, p.numbers) for n, p in g.priors.items()} for g in (one, other)
-    ]
-    if not keys and priors[0] != priors[1]:
-        words = f"its material is another one than in {base}"
-        yield Finding(str(file), words, remedy, None, "gear.material")
+    mine, theirs = (_of_kind(each) for each in (one, other))
+    for key in sorted({*mine, *theirs}):
+        if mine.get(key) != theirs.get(key):
+            here, there = (each.get(key, "not stated") for each in (mine, theirs))
+            words = f"is {here}, and {there} in {base}"
+            yield Finding(str(file), words, remedy, None, key)
 
 
-def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the entries of nested tables by their dotted keys."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
+def _of_kind(gear: Gear) -> dict[str, Any]:
+    """Return what is the same for all gears of a kind, by dotted keys."""
+    tables = {name: table for name, table in gear.source.items() if name != "columns"}
+    flat = {f"{n}.{key}": v for n, table in tables.items() for key, v in table.items()}
+    flat = {key: v for key, v in flat.items() if key.partition(".")[2] not in _OWN}
+    # A material of one name may stand in several files.
+    flat["gear.material"] = (gear.material, gear.priors["E0"].numbers, gear.density)
+    return flat
 
 
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:

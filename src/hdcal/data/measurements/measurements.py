@@ -21,9 +21,14 @@ from hdcal.data.measurements.checks import (
 from hdcal.data.measurements.labels import mountings, run_labels
 from hdcal.data.measurements.notes import ASSUMED, source_notes
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
+from hdcal.data.tables.columns import (
+    REQUIRED,
+    Column,
+    as_named,
+    choose_columns,
+    in_place_of_force,
+)
 from hdcal.data.tables.headers import QUANTITIES
-from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
@@ -117,7 +122,9 @@ def read_measurements(
     Raises:
         InputError: holds everything that is wrong with the source.
     """
-    with FileFindings(source_name(data)) as findings:
+    name = source_name(data)
+    name = name if sheet is None else f"{name}, sheet {quoted(sheet)}"
+    with FileFindings(name) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
         chosen = choose_columns(table, mapping or {}, QUANTITIES, REQUIRED, findings)
         used = in_place_of_force(chosen)
@@ -154,7 +161,6 @@ def measured_in(
     left_out: dict[str, Finding] = {}
     while True:
         wrong = FileFindings(findings.file)
-        wrong.places = findings.places
         read = _measured(table, used, wrong, gear, whole=whole)
         gears = read["specimen"] if wrong.rows else []
         bad = bad_gears(wrong, table.rows, gears)

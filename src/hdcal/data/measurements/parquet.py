@@ -18,9 +18,14 @@ from hdcal.data.measurements.screened import asked_range, screened, screening_no
 from hdcal.data.reading import gear_of
 from hdcal.data.tables.arrays import arrow_grid
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
+from hdcal.data.tables.columns import (
+    REQUIRED,
+    Column,
+    as_named,
+    choose_columns,
+    in_place_of_force,
+)
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.parquet_files import parquet_files, parquet_table
 from hdcal.data.tables.shapes import table_of
 

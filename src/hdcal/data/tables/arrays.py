@@ -2,18 +2,18 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.grid import ArrayGrid, SourceLine, stored_text
 from hdcal.errors import quoted
 
 if TYPE_CHECKING:
-    import pandas as pd
     from pyarrow import Schema
 
 # What findings call a table in memory.
@@ -41,8 +41,6 @@ def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
         InputError: arrays of several lengths, or of more than one dimension; headers
             of several levels.
     """
-    import pandas as pd
-
     if hasattr(data, "to_pandas"):
         data = data.to_pandas()
     try:
@@ -106,10 +104,8 @@ def arrow_grid(
     return ArrayGrid(np.arange(rows) + first, len(plain), [header], load, numeric)
 
 
-def _plain_column(column: "pd.Series") -> np.ndarray:
+def _plain_column(column: pd.Series) -> np.ndarray:
     """Return a column of a DataFrame as numbers, or as objects: texts and numbers."""
-    import pandas as pd
-
     types = pd.api.types
     if types.is_numeric_dtype(column) and not types.is_bool_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
@@ -136,36 +132,24 @@ def mat_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[str]]:
     except Exception as error:  # whatever a parser makes of a broken file
         words = f"is no .mat file that can be read ({error})"
         findings.refuse(words, "Save it anew")
-    named = [*_arrays(content)]
-    twice = [name for name, many in Counter(n for n, _ in named).items() if many > 1]
-    if twice:
-        words = f"holds {', '.join(map(quoted, twice))} more than once"
-        findings.refuse(words, "Save one run in a file, or give each a name")
-    vectors = {name: array for name, array in named if array.ndim == 1}
-    matrices = [(name, array) for name, array in named if array.ndim == 2]
-    lengths = Counter(map(len, vectors.values()))
+    arrays = [*_arrays(content)]
+    lengths = Counter(len(array) for _, array in arrays if array.ndim == 1)
     usual = [size for size, many in lengths.items() if many > 1]
-    if len(usual) == 1:
-        taken = {n: a for n, a in vectors.items() if len(a) == usual[0]}
-        left = [*_not_taken(content, taken)]
+    taken = [(n, a) for n, a in arrays if a.ndim == 1 and [len(a)] == usual]
+    if taken and len({name for name, _ in taken}) == len(taken):
+        left = [name for name, array in arrays if [len(array)] != usual]
         note = f"not read of the file: {', '.join(map(quoted, left))}"
-        return _array_grid([*taken], [*taken.values()]), [note] if left else []
+        names, vectors = zip(*taken, strict=True)
+        return _array_grid(names, vectors), [note] if left else []
+    matrices = [(name, array) for name, array in arrays if array.ndim == 2]
     if not usual and len(matrices) == 1:
         name, matrix = matrices[0]
         names = [str(k + 1) for k in range(matrix.shape[1])]
         note = f"the matrix {quoted(name)} holds the readings"
         return _array_grid(names, [*matrix.T]), [note]
-    names = ", ".join(quoted(name) for name, _ in named) or "no arrays"
-    words = f"holds no one table of readings: {names}"
-    findings.refuse(words, "Save vectors of one length, and nothing else")
-
-
-def _not_taken(content: Mapping[str, Any], taken: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the variables of a .mat file that are not among the readings."""
-    for name, value in content.items():
-        inside = isinstance(value, dict) and {*value} <= {*taken}
-        if name not in taken and not name.startswith("__") and not inside:
-            yield name
+    held = ", ".join(quoted(name) for name, _ in arrays) or "no arrays"
+    words = f"holds no one table of readings: {held}"
+    findings.refuse(words, "Save vectors of one length, each under one name")
 
 
 def _arrays(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
@@ -174,10 +158,5 @@ def _arrays(content: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
         for key, value in content.items():
             if not key.startswith("__"):
                 yield from _arrays(value, key)
-    elif (
-        isinstance(content, np.ndarray)
-        and content.dtype.kind in "iuf"
-        and content.ndim in (1, 2)
-        and len(content) >= _FEWEST
-    ):
-        yield name, content
+    elif isinstance(content, np.ndarray) and content.dtype.kind in "iuf":
+        yield from [(name, content)] if content.size >= _FEWEST else []

@@ -15,7 +15,6 @@ _WITH_UNIT = re.compile(rf"([+-]?[\d.,eE+-]+)\s*({_UNITS})")
 # Whole numbers whose thousands are marked by points; by commas, at least once.
 _POINTED = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
-_ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 # Label of a row whose source states none.
 NOT_STATED = "not stated"
 # Index, problem and remedy of a cell.
@@ -46,9 +45,6 @@ def read_number(cell: str, comma: bool) -> float:
     if not cell:
         raise CellError("the cell is empty", "Fill it in or leave out the row")
     cell = cell.removesuffix(unit_in(cell)).rstrip()
-    if _ENDLESS.fullmatch(cell):
-        remedy = "Leave out the row if nothing was read"
-        raise CellError(f"'{cell}' is not a finite number", remedy)
     digits, point = any(map(str.isdigit, cell)), cell
     if comma and "." not in cell:
         point = cell.replace(",", ".")
@@ -60,8 +56,7 @@ def read_number(cell: str, comma: bool) -> float:
         if digits:
             remedy = "Write a plain number with a point, and no sign for thousands"
         raise CellError(f"'{cell}' is not a number", remedy)
-    number = float(point)
-    if math.isinf(number):
+    if math.isinf(number := float(point)):
         raise CellError(f"'{cell}' is too large for a finite number", "Check the cell")
     return number
 
@@ -98,13 +93,10 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
     numbers, faults = np.full(len(cells), np.nan), []
     for index, cell in enumerate(cells.tolist()):
         try:
-            numbers[index] = (
-                cell
-                if isinstance(cell, float | int)
-                and not isinstance(cell, bool)
-                and math.isfinite(cell)
-                else read_number(str(cell), comma)
-            )
+            if type(cell) in (float, int) and math.isfinite(cell):
+                numbers[index] = cell
+            else:
+                numbers[index] = read_number(str(cell), comma)
         except CellError as error:
             faults.append((index, *error.args))
     return numbers, faults

@@ -2,19 +2,19 @@
 
 import csv
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+import pandas as pd
 
 from hdcal.data.tables.cells import is_number
 
 SEPARATORS = "\t;|,"
-T = TypeVar("T")
 
 
 class SourceLine(NamedTuple):
@@ -69,17 +69,17 @@ class Grid(ABC):
         """
 
     @abstractmethod
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """Return the index of each cell, shape (n,), and the texts in a column."""
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
 
     @abstractmethod
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
 
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
-        index, texts = self.labels(column)
-        return np.array(texts, object)[index].tolist()
+    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+        """Return the index of each cell, shape (n,), and the texts in a column."""
+        index, texts = pd.factorize(np.array(self.texts(column), object))
+        return index, texts.tolist()
 
     def is_numeric(self, column: int) -> bool:
         """Tell whether the source itself states that a column holds only numbers."""
@@ -130,10 +130,6 @@ class TextGrid(Grid):
         if self.quoted:
             return [split_line(line, mark)[column] for line in self.text]
         return [line.split(mark, column + 1)[column].strip() for line in self.text]
-
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """Return the index of each cell, shape (n,), and the texts in a column."""
-        return factorize(self.texts(column))
 
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
@@ -193,10 +189,15 @@ class ArrayGrid(Grid):
         """Return columns by position, shape (n,) each; see `Grid`."""
         return {place: self._column(place) for place in columns}
 
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
+        index, texts = self.labels(column)
+        return np.array(texts, object)[index].tolist()
+
     def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
         """Return the index of each cell, shape (n,), and the texts in a column."""
-        index, cells = factorize(self._column(column).tolist())
-        return index, [*map(stored_text, cells)]
+        index, cells = pd.factorize(self._column(column))
+        return index, [*map(stored_text, cells.tolist())]
 
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
@@ -221,12 +222,6 @@ class ArrayGrid(Grid):
             cells = floats.astype(object)
             cells[np.isnan(floats)] = ""
         return cells
-
-
-def factorize(labels: Sequence[T]) -> tuple[np.ndarray, list[T]]:
-    """Return the index of each label, shape (n,), and labels in order of appearance."""
-    names = {label: index for index, label in enumerate(dict.fromkeys(labels))}
-    return np.fromiter((names[one] for one in labels), int, len(labels)), [*names]
 
 
 def stored_text(cell: Any) -> str:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 # First bytes of a Parquet file.
 PARQUET = b"PAR1"
-_REMEDY = "Save it anew"
 # Tables of other kinds, of which a folder is a case.
 _OTHERS = {".csv", ".txt", ".tsv", ".xlsx", ".lvm", ".dat"}
 
@@ -67,36 +66,33 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     try:
         table = tables.dataset([*files], format="parquet", **split if keys else {})
         schemas = [one.physical_schema for one in table.get_fragments()]
-        return table.replace_schema(_joined([*schemas, kinds], files, findings))
+        return table.replace_schema(_joined([*schemas, kinds], findings))
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(f"is no Parquet file that can be read ({error})", _REMEDY)
+        findings.refuse(
+            f"is no Parquet file that can be read ({error})", "Save it anew"
+        )
 
 
-def _joined(
-    schemas: Sequence["Schema"], files: Sequence[str], findings: FileFindings
-) -> "Schema":
-    """Return the columns of all files; one that has several kinds is refused."""
+def _joined(schemas: Sequence["Schema"], findings: FileFindings) -> "Schema":
+    """Return the columns of all files; one that is read and has several is refused."""
     import pyarrow as arrow
 
     fields: dict[str, list] = {}
-    for place, schema in enumerate(schemas):
-        for field in schema:
-            fields.setdefault(field.name, []).append((place, field))
+    for field in (field for schema in schemas for field in schema):
+        fields.setdefault(field.name, []).append(arrow.schema([field]))
     joined = []
-    for name, several in fields.items():
-        each = [arrow.schema([field]) for _, field in several]
+    for name, each in fields.items():
         try:
             # A column that is empty in a file, or narrower, is no other kind.
             schema = arrow.unify_schemas(each, promote_options="permissive")
             joined.append(schema.field(0))
         except arrow.ArrowTypeError:
-            first = several[0][1].type
-            at, other = next((i, f.type) for i, f in several if f.type != first)
-            words = f"{quoted(name)} is {other} in {files[at]}, {first} before"
             if parse_header(name).quantity:
-                findings.add(words, _REMEDY)
+                kinds = dict.fromkeys(str(one.field(0).type) for one in each)
+                words = f"{quoted(name)} is {' and '.join(kinds)} in different files"
+                findings.add(words, "Save it as one kind")
     if findings:
         raise InputError(findings)
     return arrow.schema(joined)

@@ -15,8 +15,8 @@ from hdcal.data.tables.cells import (
     read_numbers,
     thousands,
 )
+from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS
-from hdcal.data.tables.named_columns import Column
 from hdcal.errors import quoted
 
 # Share of cells from which on a column is no slow channel, and cells that make one.
@@ -93,7 +93,7 @@ def _numbers(
         # One decimal mark serves all columns: some may have been read by another.
         cells = {place: np.array(table.grid.texts(place), object) for place in cells}
         odd = {*cells}
-    comma = has_comma(column for place, column in cells.items() if place in odd)
+    comma = bool(odd) and has_comma(cells.values())
     values = {}
     for name, column in numeric.items():
         numbers, faults = cells[column.position], []
