@@ -164,21 +164,6 @@ def test_a_negative_slope_in_places_is_asked_about():
     assert (one.kind, one.action) == ("negative slope", "asked")
 
 
-def test_a_clock_that_wraps_is_counted_on():
-    x, y = ramp()
-    time = np.r_[np.arange(100.0, 200.0), np.arange(100.0)]
-    found = screen(x, y, time)
-    assert only(found).action == "new zero"
-    np.testing.assert_allclose(np.diff(found.time), 1.0)
-
-
-def test_a_clock_reset_with_a_new_test_is_asked_about():
-    x, y = ramp(100)
-    time = np.tile(np.arange(100.0), 2)
-    found = screen(np.tile(x, 2), np.tile(y, 2), time)
-    assert [one.kind for one in found.asked] == ["clock"]
-
-
 def test_a_saturated_force_is_cut():
     x, y = ramp(back=True)
     y = np.round(np.minimum(y, 15.0), 3)

@@ -55,11 +55,6 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
     """Return the clearest jump of a zero, or None.
 
     Where noise is larger than the steps between rows, means of rows tell more.
-
-    Args:
-        x: deformation, without wild readings, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading.
     """
     for row in possible_jumps(x, y, scatter)[:_TRIED]:
         if (jump := _jump(x, y, int(row), REACH, scatter)) is not None:
@@ -143,16 +138,7 @@ def _jump(
     scatter: float,
     in_cycles: bool = False,
 ) -> Jump | None:
-    """Return the jump before a row, None where the curve does not go on after it.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-        row: the first one after it.
-        reach: rows on each side that tell its size.
-        scatter: sd of the deformation's reading.
-        in_cycles: only where the record has cycles, of some rows each.
-    """
+    """Return the jump before a row, None where the curve does not go on after it."""
     jump = _measured(x, y, row, reach, scatter)
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
@@ -199,12 +185,6 @@ def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
     """Tell whether the curve goes on with the same slope, over many rows.
 
     A part that broke has another one, or none.
-
-    Args:
-        x: deformation, the jump taken out, shape (n,).
-        y: force, likewise.
-        row: the first one after it.
-        turns: rows at which the movement turns.
     """
     edges = np.r_[0, turns, x.size]
     left = edges[edges <= row - SIDE].max(initial=0)
@@ -235,13 +215,6 @@ def _stays(
 
     A part that gives way in one cycle has another loop in the next one, but about the
     same centre; a zero that jumped moves the centre. Only cycles can tell.
-
-    Args:
-        x: deformation, the jump taken out, shape (n,).
-        y: force, likewise.
-        after: which rows come after it.
-        jump: that was taken out.
-        turning: rows at which the movement turns, and its first sign.
     """
     turns, sign = turning
     if turns.size < _CYCLES:

@@ -14,11 +14,6 @@ _NOISE = 0.05
 def plain_runs(x: np.ndarray, y: np.ndarray, run: np.ndarray) -> np.ndarray:
     """Tell which runs are short, straight and rising, with independent noise.
 
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-        run: index of each row's run, shape (n,).
-
     Returns:
         By index of the run.
     """

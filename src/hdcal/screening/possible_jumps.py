@@ -76,13 +76,7 @@ class Sides:
 
 
 def possible_jumps(x: np.ndarray, y: np.ndarray, scatter: float) -> np.ndarray:
-    """Return rows before which a zero may have jumped, the clearest first.
-
-    Args:
-        x: deformation, without wild readings, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading.
-    """
+    """Return rows before which a zero may have jumped, the clearest first."""
     rows = looked_at(x, y)
     rows = rows[(rows >= SIDE) & (rows <= x.size - SIDE)]
     if rows.size < 2 * SIDE:
@@ -175,13 +169,7 @@ def _reach(x: np.ndarray) -> np.ndarray:
 def _one_way(
     values: tuple[np.ndarray, np.ndarray], sides: Sides, scatter: float
 ) -> np.ndarray:
-    """Tell where both sides move the same way, or rest.
-
-    Args:
-        values: of a channel in the windows of both sides.
-        sides: of each boundary.
-        scatter: sd of the channel's reading.
-    """
+    """Tell where both sides move the same way, or rest."""
     ways = []
     for each, rests in zip(values, sides.rests, strict=True):
         steps = np.diff(each, axis=1)

@@ -14,7 +14,6 @@ Kind = Literal[
     "wild reading",
     "opposite sign",
     "negative slope",
-    "clock",
     "saturation of the force",
     "saturation of the deformation",
     "scatter of the deformation",
@@ -111,7 +110,6 @@ class Screening:
         kept: which rows stay in the record, shape (n,).
         deformation: with each jump of its zero taken out [mm], shape (n,).
         force: likewise, turned where its sign was opposite [N], shape (n,).
-        time: counted on where the clock was reset [s], shape (n,), or None.
         zero: counts the jumps of a zero before each row in its run, shape (n,).
         deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
         trembling: whether that scatter hides the direction of the movement.
@@ -127,7 +125,6 @@ class Screening:
     kept: np.ndarray
     deformation: np.ndarray
     force: np.ndarray
-    time: np.ndarray | None
     zero: np.ndarray
     deformation_sd: float = 0.0
     trembling: bool = False

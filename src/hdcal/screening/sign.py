@@ -22,11 +22,6 @@ def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
     Opposite: the force falls with the deformation all along every branch, loading and
     unloading, as it does when one channel is counted the other way. Unclear: it falls
     in the mean, but not so.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading, through which it turns.
     """
     together = _rank_correlation(x, y)
     if together >= 0.0:

@@ -10,10 +10,6 @@ from hdcal.screening.result import Observation
 # Stretches of rows that one sentence names.
 _LISTED = 4
 _REMEDIES = {
-    "clock": (
-        "the clock goes back by {size} s at {rows}",
-        "Keep the order of taking; label runs in a column 'run' if a new test begins",
-    ),
     "negative slope": (
         "the {force} falls as the {deformation} grows, by {size} {slope} in the mean, "
         "but not all along: no stiffness can be told from it",
@@ -38,9 +34,6 @@ _SENTENCES = {
     ("opposite sign", "turned"): "the {force} falls as the {deformation} grows, by "
     "{size} {slope}, on every branch: one of the two is counted with the opposite "
     "sign. The sign of the {force} is turned",
-    ("clock", "new zero"): "the clock goes back by {size} s at {rows} while the test "
-    "goes on: the time is counted on from there",
-    ("clock", "cut"): "{count} at the end left out ({rows}): the clock was reset",
     ("saturation of the force", "cut"): "{count} left out ({rows}): the {force} "
     "stands at its limit of {size} {unit} while the {deformation} goes on",
     ("saturation of the deformation", "cut"): "{count} left out ({rows}): the "
@@ -114,7 +107,7 @@ def _facts(found: Observation, labels: np.ndarray, units: Quantities) -> dict[st
     return facts | {"unit": units.unit(found.unit)} | _names(units)
 
 
-_UNSIGNED = {"clock", "wild reading", "after the largest force", "before the tare"}
+_UNSIGNED = {"wild reading", "after the largest force", "before the tare"}
 _UNSIGNED |= {"opposite sign", "negative slope"}
 
 

@@ -24,9 +24,9 @@ from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
 
-# What may differ between the gear files of gears of one kind.
-_OWN = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm", "name")
-_OWN += ("nominal_deformation_mm",)
+# First parts of the dotted keys that may differ between the files of gears of one kind.
+_OWN = ("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm")
+_OWN += ("gear.load_height_mm", "gear.name", "gear.nominal_deformation_mm", "columns.")
 _SIZES = ("wall_thickness", "radius", "length", "load_height")
 # What one file holds, its specimens named, and its gear; None where it has none.
 _Part = tuple[Measurements, Gear | None]
@@ -141,24 +141,21 @@ def _why(first: Finding, folder: Path) -> Finding:
 
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
-    """Yield the tables in which a gear file differs from that of all gears."""
+    """Yield differences of a gear file from that of all gears, but for sizes."""
+    mine, theirs = (
+        pd.json_normalize(each.source).to_dict("records")[0] for each in (one, other)
+    )
     remedy = "Gears of one kind differ in their sizes only"
-    mine, theirs = (_of_kind(each) for each in (one, other))
-    for key in sorted({*mine, *theirs}):
-        if mine.get(key) != theirs.get(key):
-            here, there = (each.get(key, "not stated") for each in (mine, theirs))
-            words = f"is {here}, and {there} in {base}"
-            yield Finding(str(file), words, remedy, None, key)
-
-
-def _of_kind(gear: Gear) -> dict[str, Any]:
-    """Return what is the same for all gears of a kind, by dotted keys."""
-    tables = {name: table for name, table in gear.source.items() if name != "columns"}
-    flat = {f"{n}.{key}": v for n, table in tables.items() for key, v in table.items()}
-    flat = {key: v for key, v in flat.items() if key.partition(".")[2] not in _OWN}
-    # A material of one name may stand in several files.
-    flat["gear.material"] = (gear.material, gear.priors["E0"].numbers, gear.density)
-    return flat
+    keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
+    keys = [key for key in keys if mine.get(key) != theirs.get(key)]
+    for key in keys:
+        here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
+        words = f"is {here}, and {there} in {base}"
+        yield Finding(str(file), words, remedy, None, key)
+    # Materials of one name may stand in several files.
+    if not keys and one.priors["E0"].numbers != other.priors["E0"].numbers:
+        words = f"its material is another one than in {base}"
+        yield Finding(str(file), words, remedy, None, "gear.material")
 
 
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:

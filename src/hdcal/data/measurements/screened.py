@@ -61,8 +61,7 @@ def screened(
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
     units = measured.units
-    time = measured.get("time")
-    result = screen(x, measured["force"], time, run, whole=whole, wanted=wanted)
+    result = screen(x, measured["force"], run, whole=whole, wanted=wanted)
     if result.asked:
         left = _without_asked(measured, result, skip_bad, whole=whole)
         return screened(left, wanted, whole=whole)
@@ -83,9 +82,7 @@ def screened(
         remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
         raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
-    columns = ("deformation", "force", "zero", "time")
-    moved = {name: getattr(result, name) for name in columns}
-    moved = {name: values for name, values in moved.items() if values is not None}
+    moved = {name: getattr(result, name) for name in ("deformation", "force", "zero")}
     left = measured.assign(**moved).where(result.kept)
     return _without_scatter(left, run[result.kept], result), result
 

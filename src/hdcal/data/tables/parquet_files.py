@@ -66,7 +66,7 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     try:
         table = tables.dataset([*files], format="parquet", **split if keys else {})
         schemas = [one.physical_schema for one in table.get_fragments()]
-        return table.replace_schema(_joined([*schemas, kinds], findings))
+        return table.replace_schema(_joined([*schemas, kinds], files, findings))
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of a broken file
@@ -75,24 +75,27 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
         )
 
 
-def _joined(schemas: Sequence["Schema"], findings: FileFindings) -> "Schema":
+def _joined(
+    schemas: Sequence["Schema"], files: Sequence[str], findings: FileFindings
+) -> "Schema":
     """Return the columns of all files; one that is read and has several is refused."""
     import pyarrow as arrow
 
-    fields: dict[str, list] = {}
-    for field in (field for schema in schemas for field in schema):
-        fields.setdefault(field.name, []).append(arrow.schema([field]))
     joined = []
-    for name, each in fields.items():
+    for name in dict.fromkeys(name for schema in schemas for name in schema.names):
+        with_it = ((i, one) for i, one in enumerate(schemas) if name in one.names)
+        each = [(i, one.field(name)) for i, one in with_it]
         try:
             # A column that is empty in a file, or narrower, is no other kind.
-            schema = arrow.unify_schemas(each, promote_options="permissive")
+            several = [arrow.schema([field]) for _, field in each]
+            schema = arrow.unify_schemas(several, promote_options="permissive")
             joined.append(schema.field(0))
         except arrow.ArrowTypeError:
+            first = each[0][1].type
+            at, other = next((i, f.type) for i, f in each if f.type != first)
+            words = f"{quoted(name)} is {other} in {files[at]}, {first} before"
             if parse_header(name).quantity:
-                kinds = dict.fromkeys(str(one.field(0).type) for one in each)
-                words = f"{quoted(name)} is {' and '.join(kinds)} in different files"
-                findings.add(words, "Save it as one kind")
+                findings.add(words, "Save it anew")
     if findings:
         raise InputError(findings)
     return arrow.schema(joined)
