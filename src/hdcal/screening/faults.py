@@ -120,12 +120,6 @@ def _jumps(one: Run) -> bool:
         if jump is None:
             break
         row = int(rows[jump.row])
-        if _rested(one, row):
-            before = np.flatnonzero(one.kept[:row])
-            one.cut(before, TARE)
-            size, _, unit = _size(jump)
-            one.observe("before the tare", before, size, unit, "cut")
-            continue
         one.x[row:] -= jump.deformation
         one.y[row:] -= jump.force
         # what is left of one that was found before
@@ -143,9 +137,3 @@ def _jumps(one: Run) -> bool:
 def _size(jump: Jump) -> tuple[float, Kind, str]:
     kind, unit = _JUMPS[jump.channel]
     return jump.deformation if unit == "mm" else jump.force, kind, unit
-
-
-def _rested(one: Run, row: int) -> bool:
-    """Tell whether nothing moved before a row."""
-    before = np.ptp(one.x[:row][one.kept[:row]])
-    return bool(before < _REST * np.ptp(one.x[row:][one.kept[row:]]))

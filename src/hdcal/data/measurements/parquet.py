@@ -16,7 +16,7 @@ from hdcal.data.measurements.measurements import Measurements, measured_in
 from hdcal.data.measurements.notes import source_notes
 from hdcal.data.measurements.screened import asked_range, screened, screening_notes
 from hdcal.data.reading import gear_of
-from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.columns import (
     REQUIRED,
@@ -26,7 +26,11 @@ from hdcal.data.tables.columns import (
     in_place_of_force,
 )
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.tables.parquet_files import parquet_files, parquet_table
+from hdcal.data.tables.parquet_files import (
+    parquet_files,
+    parquet_table,
+    plain_columns,
+)
 from hdcal.data.tables.shapes import table_of
 
 if TYPE_CHECKING:
@@ -108,9 +112,9 @@ def open_parquet(
         dataset = parquet_table(files, root, findings)
         common, notes = gear_of(gear, nearby, False, (theory, None, reading))
         named = {**common.source.get("columns", {}), **(columns or {})}
-        first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
-        grid = arrow_grid(first.schema, first.column, first.num_rows, 2)
-        table = table_of(grid, findings)
+        first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
+        frame = first.to_pandas(strings_to_categorical=True)
+        table = table_of(frame_grid(frame), findings)
         chosen = choose_columns(table, named, _USED, REQUIRED, findings)
         used = in_place_of_force(chosen)
         if "specimen" not in used:
@@ -129,13 +133,6 @@ def open_parquet(
     )
 
 
-def _plain(schema: "Schema") -> list[str]:
-    """Return the columns that hold plain cells."""
-    from pyarrow import types
-
-    return [one.name for one in schema if not types.is_nested(one.type)]
-
-
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
@@ -146,14 +143,19 @@ def read_batches(
     """
     with FileFindings(file) as findings:
         dataset = parquet_table([file], source.root, findings)
-    dataset, names = dataset.replace_schema(source.schema), _plain(source.schema)
+    dataset = dataset.replace_schema(source.schema)
+    names = plain_columns(source.schema)
     headers = [names[column.position] for column in source.used.values()]
     places = {q: place for place, q in enumerate(source.used)}
     used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
     wanted = asked_range(source.range)
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
-            grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
+            frame = rows.to_pandas(strings_to_categorical=True)
+            # Times would be as many labels as rows: of dates the day counts.
+            times = frame.select_dtypes(["datetime", "datetimetz"])
+            frame[times.columns] = times.apply(_days)
+            grid = frame_grid(frame, first)
             table = ReadTable(tuple(headers), first, grid, rows.num_rows)
             how: dict = {"skip_bad": skip_bad, "whole": False}
             read = measured_in(table, used, findings, source.gear, **how)
@@ -161,6 +163,11 @@ def read_batches(
             read, screening = screened(read, wanted, skip_bad, whole=False)
             read = replace(read, notes=tuple(screening_notes(screening, read.units)))
         yield read
+
+
+def _days(times: pd.Series) -> pd.Series:
+    """Return the days of times, in their time zone."""
+    return times.dt.tz_localize(None).dt.normalize().astype("category")
 
 
 def _whole_gears(

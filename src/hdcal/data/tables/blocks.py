@@ -231,11 +231,8 @@ def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> G
     """Return a grid with the columns of some blocks in the order of the first."""
     columns = grid.read(range(grid.width))
     spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
-
-    def load(place: int) -> np.ndarray:
-        column = columns[place].astype(object)
-        for number, (begin, end) in spans.items():
-            column[begin:end] = columns[orders[number][place]][begin:end]
-        return column
-
-    return ArrayGrid(grid.rows, grid.width, [], load)
+    moved = [columns[place].astype(object) for place in range(grid.width)]
+    for number, (begin, end) in spans.items():
+        for place, other in enumerate(orders[number]):
+            moved[place][begin:end] = columns[other][begin:end]
+    return ArrayGrid(grid.rows, grid.width, [], moved)

@@ -2,7 +2,7 @@
 
 import csv
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -173,17 +173,13 @@ class TextGrid(Grid):
 
 @dataclass(frozen=True)
 class ArrayGrid(Grid):
-    """Columns of arrays, each loaded when it is needed.
+    """Columns of arrays.
 
     Attributes:
-        load: returns a column, numbers or objects.
-        numeric: positions of the columns that are stored as numbers.
-        index: which of the loaded rows these are, shape (n,); None of all.
+        columns: numbers or objects, shape (n,) each.
     """
 
-    load: Callable[[int], np.ndarray]
-    numeric: frozenset[int] = frozenset()
-    index: np.ndarray | None = None
+    columns: Sequence[np.ndarray]
 
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
         """Return columns by position, shape (n,) each; see `Grid`."""
@@ -201,17 +197,15 @@ class ArrayGrid(Grid):
 
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
-        index = np.flatnonzero(chosen)
-        index = index if self.index is None else self.index[index]
-        return replace(self, rows=self.rows[chosen], index=index, loose=[])
+        columns = [column[chosen] for column in self.columns]
+        return replace(self, rows=self.rows[chosen], columns=columns, loose=[])
 
     def is_numeric(self, column: int) -> bool:
         """Tell whether the source itself states that a column holds only numbers."""
-        return column in self.numeric
+        return self.columns[column].dtype != object
 
     def _column(self, place: int) -> np.ndarray:
-        cells = self.load(place)
-        cells = cells if self.index is None else cells[self.index]
+        cells = self.columns[place]
         stored = cells.dtype != object
         if not stored and not all(isinstance(c, float | int) for c in cells.tolist()):
             return cells

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.grid import ArrayGrid
 from hdcal.data.tables.headers import parse_header
 from hdcal.errors import InputError, quoted
@@ -101,6 +101,13 @@ def _joined(
     return arrow.schema(joined)
 
 
+def plain_columns(schema: "Schema") -> list[str]:
+    """Return the columns that hold plain cells."""
+    from pyarrow import types
+
+    return [field.name for field in schema if not types.is_nested(field.type)]
+
+
 def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
     """Return the grid of a Parquet file.
 
@@ -108,8 +115,5 @@ def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
         InputError: it is none, or pyarrow is missing.
     """
     dataset = parquet_table([str(path)], "", findings)
-
-    def column(name: str) -> Any:
-        return dataset.to_table(columns=[name], use_threads=False).column(0)
-
-    return arrow_grid(dataset.schema, column, dataset.count_rows(), 2)
+    table = dataset.to_table(columns=plain_columns(dataset.schema), use_threads=False)
+    return frame_grid(table.to_pandas(strings_to_categorical=True))

@@ -8,7 +8,7 @@ from typing import Any
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
-from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
+from hdcal.data.tables.arrays import NAME, mat_grid, memory_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
 from hdcal.data.tables.shapes import table_of
@@ -59,7 +59,7 @@ def read_source(
         InputError: it holds no table, or it is not clear which one is meant.
     """
     if is_frame(data):
-        grid, sha256 = frame_grid(data, findings)
+        grid, sha256 = memory_grid(data, findings)
         return table_of(grid, findings), sha256
     path = Path(data)
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:

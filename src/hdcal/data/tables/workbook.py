@@ -93,7 +93,7 @@ def _grid(rows: Rows) -> ArrayGrid:
     filled = cells != ""
     cells = cells[:, filled.any(axis=0)]
     places = np.arange(len(rows)) + 1
-    grid = ArrayGrid(places, cells.shape[1], [], lambda place: cells[:, place])
+    grid = ArrayGrid(places, cells.shape[1], [], [*cells.T])
     return grid.take(filled.any(axis=1))
 
 
