@@ -35,7 +35,6 @@ def read_case(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    material: Path | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     reading: str | None = None,
@@ -57,7 +56,6 @@ def read_case(
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
         theory: overrides the gear file's theory.
-        material: stands for the material file that the gear names.
         encoding: of the CSV file; by default the likeliest.
         sheet: of a workbook (.xlsx); by default the one with readings. With an
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
@@ -86,7 +84,7 @@ def read_case(
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
-        how_read = (theory, material, reading)
+        how_read = (theory, reading)
         described = of_gear.attempt(gear_of, gear, nearby, folder, how_read)
         known = None if described is None else described[0]
         named = columns if known is None else known.source.get("columns", {}) | columns
@@ -131,7 +129,7 @@ def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     nearby: Path | None,
     folder: bool,
-    asked: tuple[str | None, Path | None, str | None],
+    asked: tuple[str | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and notes on its source.
 
@@ -139,9 +137,9 @@ def gear_of(
         gear: that was named, as in `read_case`.
         nearby: place of a gear file that may be there; None of a table in memory.
         folder: whether one has to be there.
-        asked: theory, material and reading, as in `read_case`.
+        asked: theory and reading, as in `read_case`.
     """
-    theory, material, reading = asked
+    theory, reading = asked
     notes = [f"the deformation is {reading}, as was asked"] if reading else []
     if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
         gear = nearby
@@ -149,7 +147,7 @@ def gear_of(
     if gear is not None:
         known = read_gear(gear, *asked)
         return known, (*_defaults(known), *notes)
-    if theory not in (None, SPRING) or material is not None or reading is not None:
+    if theory not in (None, SPRING) or reading is not None:
         words = "no gear file says the sizes that this needs"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
     return unsized(), (UNSIZED,)

@@ -65,7 +65,7 @@ def read_gear_folder(
     Returns:
         The case, and a table of the sizes of each gear where they have files.
     """
-    asked, (named, _) = (theory, None, reading), asked_columns(data, columns)
+    asked, (named, _) = (theory, reading), asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
     labels, cases = gear_labels(files, folder)
     own = [file.parent / GEAR_NAME for file in files] if cases else []

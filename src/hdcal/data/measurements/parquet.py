@@ -110,7 +110,7 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        common, notes = gear_of(gear, nearby, False, (theory, None, reading))
+        common, notes = gear_of(gear, nearby, False, (theory, reading))
         named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
         frame = first.to_pandas(strings_to_categorical=True)
