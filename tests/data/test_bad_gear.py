@@ -104,8 +104,7 @@ ONE += [
     for stated, key, words in CERTIFICATES
 ]
 CASES |= {
-    f"{place}: {key}": (text, [(row, key, words)])
-    for place, (text, row, key, words) in enumerate(ONE)
+    f"{place}: {where[1]}": (text, [where]) for place, (text, *where) in enumerate(ONE)
 }
 
 

@@ -84,17 +84,6 @@ def test_a_gear_may_be_stated_in_memory():
     assert str(caught.value.findings[0]).startswith("gear, column 'gear.radius'")
 
 
-def test_without_a_gear_a_stiffness_is_asked():
-    found = hdcal.read_case(FRAME)
-    assert (found.gear.theory, found.gear.name) == ("spring", "part")
-    assert "its stiffness is asked, no K" in " ".join(found.notes)
-
-
-def test_an_index_with_a_name_is_a_column():
-    found = hdcal.read_case(FRAME.set_index(["run", "time_s"]))
-    assert found.run_labels == ("a", "b") and "time" in found.records.known
-
-
 def test_a_unit_against_its_header_is_told():
     table = FRAME.rename(columns={"deformation_mm": "disp_um", "Kraft [kN]": "F_kN"})
     case = hdcal.read_case(table)

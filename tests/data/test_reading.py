@@ -1,7 +1,6 @@
 """A good table is read as what it says, whatever program wrote it."""
 
 import codecs
-import hashlib
 
 import numpy as np
 import pytest
@@ -122,15 +121,6 @@ def test_labels_become_indices_in_order_of_appearance(folder):
     assert "specimens" not in case.records.known
 
 
-def test_one_run_label_on_two_specimens_is_two_runs(folder):
-    content = "deformation_mm;force_N;run;specimen;time_s\n" + "".join(
-        f"0.{i % 3};{i}.5;1;{gear};{i % 3}\n" for i, gear in enumerate("xxxyyy")
-    )
-    case = read(folder, content)
-    assert case.run_labels == ("x/1", "y/1")
-    assert case.records.run.tolist() == [0, 0, 0, 1, 1, 1]
-
-
 @pytest.mark.parametrize(
     ("header", "mapped"),
     [
@@ -157,17 +147,6 @@ def test_a_mapping_wins_over_a_name(folder):
     assert case.records.force[5] == 10.0
     assert case.run_labels == ("a",)
     assert case.notes == ("columns not used: 'force_N'",)
-
-
-def test_a_note_names_the_first_rows_of_new_ramps(folder):
-    ramp = "".join(f"{i / 20},{2 * i}\n" for i in range(1, 7))
-    case = read(folder, f"deformation_mm,force_N\n{ramp * 2}")
-    (note,) = case.notes
-    assert "(row 8)" in note and "`run`" in note
-    assert "unloading" not in case.records.known
-    assert case.records.direction[6] == -1
-    labelled = "".join(f"{row},{run}\n" for run in "ab" for row in ramp.splitlines())
-    assert read(folder, f"deformation_mm,force_N,run\n{labelled}").notes == ()
 
 
 def test_the_articles_table():
@@ -199,16 +178,6 @@ def test_the_load_cell_of_nist():
     shape = g.length * g.wall_thickness**3 / g.radius**3
     nominal = np.pi * case.gear.priors["E0"].numbers[0] * shape / (24 * series)
     assert slope == pytest.approx(nominal, rel=2e-3)
-
-
-def test_file_and_folder_give_the_same_case(folder):
-    from_folder = read_case(folder)
-    from_file = read_case(folder / "data.csv", folder / "gear.toml")
-    assert from_folder.name == folder.name
-    assert from_file.name == "data"
-    raw = (folder / "data.csv").read_bytes()
-    assert from_folder.data_sha256 == hashlib.sha256(raw).hexdigest()
-    assert from_file.data_sha256 == from_folder.data_sha256
 
 
 LOTS = """specimen,Charge,lot,Bediener,run,deformation_mm,force_N

@@ -141,13 +141,6 @@ def test_several_wild_readings_do_not_hide_each_other():
     assert one.rows == ((40, 42), (52, 52), (100, 100), (150, 151))
 
 
-def test_a_wild_reading_of_the_deformation_is_cut():
-    x, y = ramp()
-    x[77] = 9.9
-    one = only(screen(x, y))
-    assert (one.kind, one.rows) == ("wild reading", ((77, 77),))
-
-
 def test_the_record_ends_where_the_part_breaks():
     x, y = ramp()
     y[140:] = np.linspace(4.0, 3.0, 60)
@@ -285,11 +278,3 @@ def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
     x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
     found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
     assert not [one for one in found.observations if "jump" in one.kind]
-
-
-def test_two_rows_are_no_straight_part():
-    x, y = ramp()
-    x, y = x[::20], y[::20]
-    y[-2:] = 20.0 * y.max(), -20.0 * y.max()
-    found = screen(x, y)
-    assert found.straight is None or found.straight.rows.sum() >= 5
