@@ -88,7 +88,7 @@ def test_noise_about_one_level_has_no_jump(rows):
     x = np.linspace(0.0, 1.0, rows)
     kinds = {
         one.kind
-        for _ in range(300)
+        for _ in range(80)
         for one in screen(x, rng.normal(0.0, 1.0, rows)).observations
     }
     assert not [kind for kind in kinds if "jump" in kind]
