@@ -59,9 +59,6 @@ class _Move:
 def loading_side(deformation: np.ndarray) -> int:
     """Tell on which side of the undeformed gear it was tested.
 
-    Args:
-        deformation: as read [mm], shape (n,).
-
     Returns:
         +1 where it was pressed, -1 where it was pulled, 0 where both count: the
         smaller reaches a share of the larger that counts as a movement.
@@ -75,10 +72,6 @@ def loading_side(deformation: np.ndarray) -> int:
 def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
     """Tell loading, away from the undeformed gear, from unloading.
 
-    Args:
-        deformation: as read [mm], shape (n,).
-        movement: +1 it increased, 0 it was held, -1 it decreased, shape (n,).
-
     Returns:
         +1 loading, 0 holding, -1 unloading, in compression and in tension, shape (n,).
     """
@@ -89,12 +82,7 @@ def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
 def movement_words(
     deformation: np.ndarray, name: str = "deformation"
 ) -> dict[int, str]:
-    """Return the names of increasing (+1) and decreasing (-1) deformation.
-
-    Args:
-        deformation: of all rows, as read [mm], shape (n,).
-        name: of the deformation.
-    """
+    """Return the names of increasing (+1) and decreasing (-1) deformation."""
     side = loading_side(deformation)
     if side == 0:
         return {1: f"increasing {name}", -1: f"decreasing {name}"}

@@ -133,11 +133,8 @@ def gear_of(
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and notes on its source.
 
-    Args:
-        gear: that was named, as in `read_case`.
-        nearby: place of a gear file that may be there; None of a table in memory.
-        folder: whether one has to be there.
-        asked: theory and reading, as in `read_case`.
+    A gear file may be at the place `nearby`, and must be there in a folder. What is
+    asked are theory and reading, as in `read_case`.
     """
     theory, reading = asked
     notes = [f"the deformation is {reading}, as was asked"] if reading else []

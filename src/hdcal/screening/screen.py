@@ -6,10 +6,9 @@ from hdcal.screening.branches import name_segments, straight_part
 from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
 from hdcal.screening.faults import look_at
-from hdcal.screening.plain import plain_runs
 from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run
-from hdcal.screening.sign import Sign, sign_of_slope
+from hdcal.screening.sign import Sign, plain_runs, sign_of_slope
 from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 

@@ -144,11 +144,7 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
 
 
 def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Return which sizes cannot be beside the others: name, problem and remedy.
-
-    Args:
-        size: by name [mm]; any may be missing.
-    """
+    """Return which sizes cannot be beside the others: name, problem and remedy."""
     radius = size.get("radius", math.inf)
     both = "Check both sizes"
     faults = [

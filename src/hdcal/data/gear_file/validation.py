@@ -67,11 +67,6 @@ def checked(
 def requested(kind: type[M], context: Any, **given: Any) -> M:
     """Return the request that parameters make.
 
-    Args:
-        kind: of the request.
-        context: of its validators.
-        given: parameters by name.
-
     Raises:
         InputError: holds everything that is wrong with them.
     """

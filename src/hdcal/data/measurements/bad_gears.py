@@ -14,13 +14,7 @@ _LISTED = 3
 def bad_gears(
     findings: FileFindings, rows: np.ndarray, gears: Any
 ) -> dict[str, Finding]:
-    """Return the gears with a faulty row, each with its first fault.
-
-    Args:
-        findings: on the file.
-        rows: row of the source of each reading, shape (n,).
-        gears: label of each reading's, shape (n,); empty where a row names none.
-    """
+    """Return the gears with a faulty row, each with its first fault."""
     bad: dict[str, Finding] = {}
     places = np.flatnonzero(np.isin(rows, [*findings.rows])) if findings.rows else ()
     for place in places:
@@ -36,12 +30,7 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 
 
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
-    """Return that bad gears can be left out.
-
-    Args:
-        bad: at least one.
-        many: number of all gears; None where not all of them were read.
-    """
+    """Return that bad gears can be left out; `many` counts all, where it is known."""
     words = f"{len(bad)} of the gears read so far"
     words = words if many is None else f"{len(bad)} of {many} gears"
     words += f" {_be(bad)} bad: {shortened([*map(quoted, bad)], _LISTED)}"

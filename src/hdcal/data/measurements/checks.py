@@ -77,12 +77,7 @@ def check_reach(
 
 
 def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Tell which rows have a time before that of their run's last row, shape (n,).
-
-    Args:
-        time: of each row, shape (n,); NaN where it is wrong.
-        run: index of the mounting, shape (n,).
-    """
+    """Tell which rows have a time before that of their run's last row, shape (n,)."""
     order = np.flatnonzero(np.isfinite(time))
     order = order[np.argsort(run[order], kind="stable")]
     # A wild number may overflow here; it has a finding of its own.

@@ -50,10 +50,6 @@ def read_force(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read time [s] and force [N] from a table without a deformation, (n,) each.
 
-    Args:
-        path: the file; other columns than time and force are not looked at.
-        columns: quantity -> header with its unit in brackets.
-
     Raises:
         InputError: holds everything that is wrong with the file.
     """

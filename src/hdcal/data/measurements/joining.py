@@ -59,13 +59,7 @@ def labelled(measured: Measurements, label: str) -> Measurements:
 def joined(
     parts: Sequence[Measurements], warm: float, bad: Mapping[str, Finding]
 ) -> Measurements:
-    """Return the rows of all parts below each other.
-
-    Args:
-        parts: the first one names the whole.
-        warm: temperature of those that state none [°C].
-        bad: gears that are not among them, in addition to those of the parts.
-    """
+    """Return the rows of all parts below each other."""
     blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
     frames = [part.frame for part in parts]
     names = dict.fromkeys(name for frame in frames for name in frame)

@@ -78,13 +78,6 @@ def further_labels(
 ) -> tuple[dict[str, tuple[str, ...]], list[str]]:
     """Return lots of gears, operators, rigs and dates of runs, as `Case` has them.
 
-    Args:
-        frame: of the rows.
-        gear: index of each row's, shape (n,).
-        gears: their names.
-        run: index of each row's, shape (n,).
-        runs: their names.
-
     Returns:
         The labels, and notes on those that are not used.
     """

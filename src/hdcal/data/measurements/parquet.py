@@ -91,15 +91,6 @@ def open_parquet(
 ) -> Parquet:
     """Look into a Parquet file, or a folder of them, partitioned or not.
 
-    Args:
-        data: the file, or the folder.
-        gear: as in `read_case`; by default the gear.toml beside the file, or in the
-            folder.
-        columns: as in `read_case`, and so are all that follow.
-        theory: overrides the gear file's.
-        reading: of the deformation.
-        range: working range.
-
     Raises:
         InputError: holds everything that is wrong with its columns.
     """

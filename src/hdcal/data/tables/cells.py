@@ -66,9 +66,6 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
 
     One decimal mark serves a whole source, that of most cells. Beside numbers that are
     stored as such, commas that may all mark thousands do not count.
-
-    Args:
-        columns: objects, shape (n,) each, texts or numbers.
     """
     cells = [cell for column in columns for cell in column.tolist()]
     texts = [cell for cell in cells if isinstance(cell, str) and NUMBER.match(cell)]
@@ -82,10 +79,6 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
 
 def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault]]:
     """Read a column that is no plain array of numbers.
-
-    Args:
-        cells: texts without blanks around them, or numbers, shape (n,).
-        comma: whether texts have decimal commas.
 
     Returns:
         Floats, NaN where a cell is wrong, shape (n,); and the faults.

@@ -27,11 +27,6 @@ def sheet_grid(
 ) -> tuple[ArrayGrid, list[str]]:
     """Return a sheet, and notes on what was assumed.
 
-    Args:
-        path: of the workbook.
-        findings: of the file.
-        sheet: its name; by default the only one that holds a table of readings.
-
     Raises:
         InputError: it is no workbook, or it is not clear which sheet is meant.
     """
