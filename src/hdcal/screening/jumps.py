@@ -19,6 +19,8 @@ _STILL = 0.02
 _BOTH, _FAR = 0.2, 10.0
 # Standard errors from which on a slope is known.
 _KNOWN = 5.0
+# Standard errors of a slope that two sides of a jump may differ by.
+_UNSURE = 3.0
 # Share of the movement that must be more than scatter.
 _REAL = 0.2
 # Movements over this share of the range make a cycle, in so many of which a zero shows.
@@ -83,12 +85,9 @@ def _between_cycles(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None
     if not rows.size:
         return None
     off_x, off_y = off_sequence(x, rows), off_sequence(y, rows)
-    least_x, least_y = LEAST * spread(x), LEAST * spread(y)
     for row in rows[off_x != off_y][:_TRIED].tolist():
         jump = _jump(x, y, row, REACH, scatter, in_cycles=True)
-        if jump is None:
-            continue
-        if abs(jump.deformation) > least_x or abs(jump.force) > least_y:
+        if jump is not None:
             return jump
     return None
 
@@ -140,6 +139,10 @@ def _jump(
 ) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it."""
     jump = _measured(x, y, row, reach, scatter)
+    if abs(jump.deformation) < LEAST * spread(x) and abs(jump.force) < LEAST * spread(
+        y
+    ):
+        return None
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
     # through the scatter of the deformation
@@ -174,7 +177,10 @@ def _measured(
         off.append(float(values[row] - values[row - 1]) - usual)
         typical = float(np.median(np.abs(steps - usual))) + 0.5 * abs(usual)
         ratio.append(abs(off[-1]) / (typical + resolution(values)))
-    if min(ratio) > max(_BOTH * max(ratio), _FAR):
+    # A part that is set back goes along its curve, as far as the slope is known.
+    blur = np.sqrt(left @ left / dx.size / max(square, 1e-300)) * abs(off[0])
+    along = abs(off[1] - slope * off[0]) <= LEAST * spread(y) + _UNSURE * blur
+    if min(ratio) > max(_BOTH * max(ratio), _FAR) and not along:
         return Jump(row, "both", off[0], off[1])
     if ratio[1] >= ratio[0]:
         return Jump(row, "force", 0.0, rise - slope * run if known else off[1])
