@@ -71,8 +71,6 @@ def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[st
             )
     if extra:
         yield f"columns not used: {', '.join(map(quoted, extra))}"
-    if table.skipped:
-        yield f"{table.skipped} empty lines between the readings were skipped"
 
 
 def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
