@@ -4,10 +4,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.screening.local_fit import REACH, looked_at, resolution, spread
-from hdcal.screening.possible_jumps import LEAST, SIDE, off_sequence, possible_jumps
+from hdcal.screening.local_fit import (
+    REACH,
+    Usual,
+    looked_at,
+    median,
+    resolution,
+    spread,
+    windows,
+)
 from hdcal.screening.turning_points import noise_sd, turning_points
 
+# Rows needed on each side of a jump; from fewer it could be anything.
+SIDE = 4
+# A smaller jump, as a share of the tested range, is left to the model's noise.
+LEAST = 0.02
+# A window moves one way when this share of its way is progress, and rests when it
+# covers less than the second share of what windows usually do.
+_PROGRESS, _RESTS = 0.6, 0.25
+# Any other step about a jump is at most this share of it.
+_OTHERS = 0.5
+_NEAR = np.r_[1 - REACH : 0, 1:REACH]
 # Places that are tried.
 _TRIED = 5
 # Slopes on both sides agree when they differ by less than this share.
@@ -58,38 +75,75 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
 
     Where noise is larger than the steps between rows, means of rows tell more.
     """
-    for row in possible_jumps(x, y, scatter)[:_TRIED]:
-        if (jump := _jump(x, y, int(row), REACH, scatter)) is not None:
-            return jump
-    block = max(_block(x), _block(y))
-    for first in (0, block // 2) if block > 1 else ():
-        edges = np.arange(first, x.size, block)
-        mean_x, mean_y = (np.add.reduceat(v, edges)[:-1] / block for v in (x, y))
-        places = possible_jumps(mean_x, mean_y, scatter / np.sqrt(block))
-        for edge in edges[places[:_TRIED]].tolist():
-            near = np.arange(edge - block, edge + block + 1)
-            row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
-            if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
-                return jump
-    return _between_cycles(x, y, scatter) or _beyond_all(x, y, scatter)
+    for block in sorted({1, max(_block(x), _block(y))}):
+        for first in sorted({0, block // 2}):
+            edges = np.arange(first, x.size, block)
+            means = [
+                values if block == 1 else np.add.reduceat(values, edges)[:-1] / block
+                for values in (x, y)
+            ]
+            for place, turns in _possible(*means, scatter / np.sqrt(block))[:_TRIED]:
+                row = edges[place]
+                if block > 1:
+                    near = np.arange(row - block, row + block + 1)
+                    row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
+                jump = _jump(x, y, int(row), REACH * block, scatter, in_cycles=turns)
+                if jump is not None:
+                    return jump
+    return _beyond_all(x, y, scatter)
 
 
-def _between_cycles(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
-    """Return a jump at a turn or without load, which moves the cycles after it.
+def _possible(x: np.ndarray, y: np.ndarray, scatter: float) -> list[tuple[int, bool]]:
+    """Return rows before which a zero may have jumped, the clearest first.
 
-    One channel leaves its own sequence there. The curve does not tell where it goes on,
-    but the movements next to it do.
+    A channel steps there as it does nowhere else near. Where the movement turns, or
+    rests without load, only one channel may do so, and the cycles have to tell more.
+
+    Returns:
+        Each row, and whether the movement turns there.
     """
     rows = looked_at(x, y)
     rows = rows[(rows >= SIDE) & (rows <= x.size - SIDE)]
-    if not rows.size:
-        return None
-    off_x, off_y = off_sequence(x, rows), off_sequence(y, rows)
-    for row in rows[off_x != off_y][:_TRIED].tolist():
-        jump = _jump(x, y, row, REACH, scatter, in_cycles=True)
-        if jump is not None:
-            return jump
-    return None
+    if rows.size < 2 * SIDE:
+        return []
+    (off_x, far_x), (off_y, far_y) = _off(x, rows), _off(y, rows)
+    straight = _one_way(x, rows, scatter)
+    if scatter:
+        # The force shows the way too, and trembles less.
+        straight |= _one_way(y, rows, noise_sd(y))
+    found = np.where(straight, off_x | off_y, off_x != off_y)
+    clearest = np.argsort(-np.maximum(far_x, far_y))
+    clearest = clearest[found[clearest]]
+    return [*zip(rows[clearest].tolist(), (~straight[clearest]).tolist(), strict=True)]
+
+
+def _off(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    steps = values[rows] - values[rows - 1]
+    near = windows(np.diff(values, prepend=values[0]), rows, _NEAR)
+    level = median(near)
+    off = steps - level
+    usual = Usual.of(off, resolution(values))
+    with np.errstate(all="ignore"):
+        others = np.nanmax(np.abs(near - level[:, None]), axis=1)
+    alone = others <= _OTHERS * np.abs(off)
+    return usual.surprised(off, values.size) & alone, np.abs(off) / usual.scale
+
+
+def _one_way(values: np.ndarray, rows: np.ndarray, scatter: float) -> np.ndarray:
+    """Tell where a channel moves the same way before and after a row, or rests."""
+    sides = [windows(values, rows, o) for o in (np.arange(-REACH, 0), np.arange(REACH))]
+    with np.errstate(all="ignore"):
+        reach = [np.nanmax(each, axis=1) - np.nanmin(each, axis=1) for each in sides]
+    rests = [each < _RESTS * np.median(np.hstack(reach)) for each in reach]
+    ways = []
+    for each, still in zip(sides, rests, strict=True):
+        steps = np.diff(each, axis=1)
+        way, path = np.nansum(steps, axis=1), np.nansum(np.abs(steps), axis=1)
+        # steps of a gauge that trembles, 2/√π of its sd each
+        shaken = 1.13 * scatter * np.sum(np.isfinite(steps), axis=1)
+        moves = np.abs(way) >= _PROGRESS * (path - shaken)
+        ways.append(np.where(still, 0.0, np.where(moves, way, np.nan)))
+    return ~np.isnan(ways[0] + ways[1]) & (ways[0] * ways[1] >= 0.0)
 
 
 def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
@@ -135,7 +189,8 @@ def _jump(
     row: int,
     reach: int,
     scatter: float,
-    in_cycles: bool = False,
+    *,
+    in_cycles: bool,
 ) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it."""
     jump = _measured(x, y, row, reach, scatter)
