@@ -78,16 +78,17 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
     for block in sorted({1, max(_block(x), _block(y))}):
         for first in sorted({0, block // 2}):
             edges = np.arange(first, x.size, block)
-            means = [
+            mean_x, mean_y = (
                 values if block == 1 else np.add.reduceat(values, edges)[:-1] / block
                 for values in (x, y)
-            ]
-            for place, turns in _possible(*means, scatter / np.sqrt(block))[:_TRIED]:
-                row = edges[place]
+            )
+            blur = scatter / np.sqrt(block)
+            for place, turns in _possible(mean_x, mean_y, blur)[:_TRIED]:
+                row = int(edges[place])
                 if block > 1:
                     near = np.arange(row - block, row + block + 1)
                     row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
-                jump = _jump(x, y, int(row), REACH * block, scatter, in_cycles=turns)
+                jump = _jump(x, y, row, REACH * block, scatter, in_cycles=turns)
                 if jump is not None:
                     return jump
     return _beyond_all(x, y, scatter)

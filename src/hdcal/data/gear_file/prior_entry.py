@@ -61,12 +61,17 @@ _NUMBERS: dict[str, Any] = {
     ),
     "high": Annotated[float, AfterValidator(_above_low)],
 }
-_ENTRIES = {
-    family: create_model(
-        family, __base__=_Entry, **{n: (_NUMBERS.get(n, float), ...) for n in numbers}
-    )
-    for family, numbers in FAMILIES.items()
-}
+
+
+def _entry_of(family: str) -> type[_Entry]:
+    """Return the model of the entries of a family."""
+    numbers: dict[str, Any] = {
+        n: (_NUMBERS.get(n, float), ...) for n in FAMILIES[family]
+    }
+    return create_model(family, __base__=_Entry, **numbers)
+
+
+_ENTRIES = {family: _entry_of(family) for family in FAMILIES}
 
 
 def read_prior(

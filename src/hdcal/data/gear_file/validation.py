@@ -73,7 +73,8 @@ def requested(kind: type[M], context: Any, **given: Any) -> M:
     try:
         return kind.model_validate(given, context=context)
     except ValidationError as error:
-        findings = [Finding(p[0], *words) for p, *words in _faults(error, kind)]
+        every = _faults(error, kind)
+        findings = [Finding(place[0], problem, how) for place, problem, how in every]
         raise InputError(dict.fromkeys(findings)) from None
 
 

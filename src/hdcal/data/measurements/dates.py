@@ -1,6 +1,7 @@
 """Dates of mountings, as rigs and people write them."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,7 +31,7 @@ def dates_of(
         of: index of each row's mounting, shape (n,).
     """
     place, texts = pd.factorize(np.array(labels, object))
-    stated = texts != NOT_STATED
+    stated: Any = texts != NOT_STATED
     if not stated.any():
         return (), ""
     written, note = texts[stated], ""
@@ -41,7 +42,7 @@ def dates_of(
     if (unread := ways[0].isna().to_numpy()).any():
         odd = quoted(written[int(np.argmax(unread))])
         note = f"the date {odd} cannot be read beside the others. {_REMEDY}"
-    times = pd.Series(pd.NaT, range(len(texts)), "datetime64[s]")
+    times: Any = pd.Series(pd.NaT, range(len(texts)), "datetime64[s]")
     times[stated] = ways[0].to_numpy()
     first = times[place].groupby(np.asarray(of)).min()
     return tuple("" if pd.isna(one) else one.isoformat() for one in first), note
@@ -69,12 +70,12 @@ def days_of(labels: np.ndarray) -> np.ndarray:
     return days[place]
 
 
-def _ways(texts: np.ndarray) -> list[pd.Series]:
+def _ways(texts: np.ndarray) -> list[Any]:
     """Return texts as times, in each of the ways in which most of them can be read."""
     parts = pd.Series(texts).str.extract(_STAMP)
-    clock = pd.to_datetime(parts[1], format="mixed", errors="coerce")
+    clock: Any = pd.to_datetime(parts[1], format="mixed", errors="coerce")
     clock = (clock - clock.dt.normalize()).fillna(pd.Timedelta(0))
-    ways: list[pd.Series] = []
+    ways: list[Any] = []
     for form in _DAYS:
         times = pd.to_datetime(parts[0], format=form, errors="coerce")
         times = times.where((times > _EARLIEST) & (times < _LATEST))

@@ -1,6 +1,7 @@
 """Labels of rows: the mounting of each, its lot, operator, rig and date."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -103,7 +104,7 @@ def _one_each(
     if quantity not in frame:
         return (), ""
     labels = frame[quantity].astype(str).to_numpy()
-    each = pd.DataFrame({"of": index, "label": labels}).drop_duplicates()
+    each: Any = pd.DataFrame({"of": index, "label": labels}).drop_duplicates()
     each = each[each["label"] != NOT_STATED]
     if (several := each["of"].duplicated()).any():
         word = "specimen" if quantity == "lot" else "run"

@@ -81,7 +81,7 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
         label = np.full((1, filled.sum()), names[-1], object)
         blocks.append(np.concatenate([each[:, filled], label]))
     columns = np.concatenate(blocks, axis=1)
-    grid = ArrayGrid(np.concatenate(rows), period + 1, [], columns)
+    grid = ArrayGrid(np.concatenate(rows), period + 1, [], [*columns])
     note = f"{len(names)} specimens stand side by side: {', '.join(map(quoted, names))}"
     return replace(
         table,
