@@ -43,5 +43,5 @@ def test_the_step_is_the_stated_one_or_the_least_between_forces():
 def test_readings_of_which_none_is_left_over_are_refused_in_other_words():
     force = [0.0, 21.0, 43.0, 60.0, 82.0, 99.0]
     x = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
-    with pytest.raises(InputError, match="no reading is left over"):
+    with pytest.raises(InputError, match="scatter of the readings cannot be estimated"):
         calibrate(_case(force, x, run=np.arange(6)))

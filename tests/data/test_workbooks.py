@@ -39,7 +39,7 @@ def test_a_testing_machines_workbook(tmp_path):
     # A workbook holds sixteen digits.
     np.testing.assert_allclose(case.records.deformation, DEFORMATION, rtol=1e-14)
     np.testing.assert_allclose(case.records.force, FORCE)
-    assert "sheet 'Kurve' is meant" in case.notes[0]
+    assert "sheet 'Kurve' is read" in case.notes[0]
     assert all(note.startswith("ASSUMED") for note in case.notes[:4])
 
 

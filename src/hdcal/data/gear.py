@@ -72,7 +72,7 @@ def read_gear(
         source: the TOML file; or its tables as a mapping, where the names of the tables
             may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
-        reading: of the deformation, `radial` or `diametral`, where the file is silent.
+        reading: `radial` or `diametral`, where the file does not state it.
 
     Raises:
         InputError: holds everything that is wrong with the file.

@@ -34,7 +34,7 @@ class Motion:
         sense: sign of the last movement, before any that of the first one,
             +1 in a run that never moves; shape (n,).
         rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
-        features: of `unloading`, `holds`, `rates`, `cycles` those present, and
+        features: those present among `unloading`, `holds`, `rates`, `cycles`, and
             `holds or rates` where one of the two is.
         resets: rows reached by one step back over most of the range.
     """

@@ -15,7 +15,7 @@ class Range(NamedTuple):
     Attributes:
         low: smallest value.
         high: largest value.
-        unit: of both; empty for counts and shares.
+        unit: unit of both; empty for counts and shares.
         why: what the ends stand for.
         inner: whether the ends themselves are out.
     """

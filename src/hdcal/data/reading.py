@@ -20,12 +20,12 @@ from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
-_NEARBY = f"the gear file is the {GEAR_NAME} beside the data"
+_NEARBY = f"the gear file is the {GEAR_NAME} next to the data"
 # The note where no gear file was named, and none lies beside the data.
 UNSIZED = (
-    f"{ASSUMED}the part is a spring of which nothing is known but these readings: its "
-    "stiffness is asked, no K. K needs sizes, stated in a gear file, named or as "
-    f"{GEAR_NAME} beside the data"
+    f"{ASSUMED}without a gear file the part is a spring: the result is its stiffness, "
+    "and no K. K needs the sizes in a gear file, which is named or is the file "
+    f"{GEAR_NAME} next to the data"
 )
 
 
@@ -56,15 +56,15 @@ def read_case(
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
         theory: overrides the gear file's theory.
-        encoding: of the CSV file; by default the likeliest.
-        sheet: of a workbook (.xlsx); by default the one with readings. With an
+        encoding: encoding of a CSV file; by default the likeliest.
+        sheet: sheet of a workbook (.xlsx); by default the one with readings. With an
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
-        reading: of the deformation, `radial` or `diametral`, where the gear file is
+        reading: `radial` or `diametral` deformation, where the gear file is
             silent; by default it is taken for radial, and a note says so.
         specimen: label of the one whose rows are wanted; by default all of them.
         skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
-        range: working range, outside of which rows are left out: `0.1:0.6` of the
+        range: working range; rows outside it are left out: `0.1:0.6` of the
             deformation as read [mm], `10%:40%` of the largest force of each run, or
             `straight` for the longest straight part; by default that of the gear file,
             or `all` that was read until the force drops for good.
@@ -110,7 +110,7 @@ def asked_columns(
     """Return columns as texts, and whether the data are a table in memory."""
     if columns is not None and not isinstance(columns, Mapping):
         remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
-        raise InputError([Finding("columns", "is no mapping", remedy)])
+        raise InputError([Finding("columns", "is not a mapping", remedy)])
     if not is_frame(data) and not isinstance(data, str | os.PathLike):
         remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
         raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
@@ -137,7 +137,7 @@ def gear_of(
     asked are theory and reading, as in `read_case`.
     """
     theory, reading = asked
-    notes = [f"the deformation is {reading}, as was asked"] if reading else []
+    notes = [f"the deformation is {reading}, as requested"] if reading else []
     if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
         gear = nearby
         notes += [] if folder else [_NEARBY]
@@ -145,7 +145,7 @@ def gear_of(
         known = read_gear(gear, *asked)
         return known, (*_defaults(known), *notes)
     if theory not in (None, SPRING) or reading is not None:
-        words = "no gear file says the sizes that this needs"
+        words = "this needs sizes, and there is no gear file"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
     return unsized(), (UNSIZED,)
 
@@ -161,10 +161,10 @@ def _defaults(gear: Gear) -> Iterator[str]:
     if leaves_reading_open(gear):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
-            "twice as large, the gear file has to say so"
+            "twice as large, state that in the gear file"
         )
     if gear.theory != SPRING and "material" not in gear.source.get("gear", {}):
         yield (
             f"{ASSUMED}the gear is of steel. If not, which changes K and the influence "
-            "of the temperature, the gear file has to name its material"
+            "of the temperature, name its material in the gear file"
         )

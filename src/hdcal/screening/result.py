@@ -57,7 +57,7 @@ class Observation:
         kind: what it is.
         rows: first and last row of each stretch that it concerns, from 0.
         size: how large it is, in `unit`.
-        unit: of the size.
+        unit: unit of the size.
         action: what was done about it.
         run: index of the run.
         where: the rows as their file names them.
@@ -87,7 +87,7 @@ class StraightPart:
         low: smallest deformation of it, as read [mm].
         high: largest deformation of it, as read [mm].
         rows: which rows it has, shape (n,); other branches have none of them.
-        slope: of the force over the deformation there, by least squares [N/mm].
+        slope: slope of the force over the deformation there, by least squares [N/mm].
         slope_sd: its standard error [N/mm].
         whole: whether every movement of the run is straight.
     """

@@ -12,9 +12,9 @@ class Run:
     """One run on its way through the screening; rows are those of the run.
 
     Attributes:
-        index: of the run.
-        rows: of the whole record, in order.
-        segment: of each row.
+        index: index of the run.
+        rows: its rows in the whole record, in order.
+        segment: segment of each row.
         kept: which rows stay.
         zero: jumps before each row.
         plain: whether a straight line explains it.
@@ -43,10 +43,10 @@ class Run:
         """Return some rows of a record, all of them kept.
 
         Args:
-            rows: of the record, in order, shape (r,).
+            rows: rows of the record, in order, shape (r,).
             x: deformation of the record, shape (n,).
             y: force of the record, shape (n,).
-            index: of the run.
+            index: index of the run.
         """
         segment, zero = np.zeros((2, rows.size), int)
         kept = np.ones(rows.size, bool)

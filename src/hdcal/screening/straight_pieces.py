@@ -31,9 +31,9 @@ class Straight(NamedTuple):
     """The longest straight part of a movement.
 
     Attributes:
-        rows: of the movement.
+        rows: rows of the movement.
         whole: whether it is the whole curve.
-        inflation: of the variance of its slope, by the correlation of neighbours.
+        inflation: factor on the variance of its slope, by correlated neighbours.
     """
 
     rows: slice

@@ -73,7 +73,7 @@ def correlation_prior(
         cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
         deformation: in the order it was taken [mm], shape (n,).
         run: index of the mounting, shape (n,).
-        time: of the readings [s], shape (n,); None where it was not measured.
+        time: time of the readings [s], shape (n,); None where it was not measured.
     """
     steps = np.diff(time) if cutoff is not None and time is not None else np.array([])
     if cutoff is not None and np.any(steps > 0.0):

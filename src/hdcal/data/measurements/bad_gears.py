@@ -34,7 +34,7 @@ def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     words = f"{len(bad)} of the gears read so far"
     words = words if many is None else f"{len(bad)} of {many} gears"
     words += f" {_be(bad)} bad: {shortened([*map(quoted, bad)], _LISTED)}"
-    remedy = "Ask for it to leave such gears out, whole, and have the others answered"
+    remedy = "Set it to leave these gears out as a whole and evaluate the others"
     return Finding("skip_bad", words, remedy)
 
 

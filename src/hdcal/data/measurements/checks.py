@@ -30,7 +30,7 @@ def check_whole(
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
         column = used["deformation"]
-        words = f"the {column.quantity} is constant, so no stiffness can be seen"
+        words = f"the {column.quantity} is constant, which gives no stiffness"
         findings.add(words, "Measure at several", None, column.header)
 
 

@@ -27,7 +27,7 @@ def dates_of(
     are returned, and the note says so, where most cannot be read, or all in two ways.
 
     Args:
-        labels: of each row, shape (n,).
+        labels: date of each row, shape (n,).
         of: index of each row's mounting, shape (n,).
     """
     place, texts = pd.factorize(np.array(labels, object))
@@ -41,7 +41,7 @@ def dates_of(
         return (), f"dates are not used: {quoted(written[0])} {how}. {_REMEDY}"
     if (unread := ways[0].isna().to_numpy()).any():
         odd = quoted(written[int(np.argmax(unread))])
-        note = f"the date {odd} cannot be read beside the others. {_REMEDY}"
+        note = f"the date {odd} cannot be read like the others. {_REMEDY}"
     times: Any = pd.Series(pd.NaT, range(len(texts)), "datetime64[s]")
     times[stated] = ways[0].to_numpy()
     first = times[place].groupby(np.asarray(of)).min()

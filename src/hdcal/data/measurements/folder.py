@@ -54,8 +54,8 @@ def read_gear_folder(
             first gear. Others may differ from it in their sizes.
         columns: as in `read_case`, and so are all that follow.
         theory: overrides the gear file's.
-        reading: of the deformation.
-        encoding: of the files.
+        reading: `radial` or `diametral`.
+        encoding: encoding of the files.
         skip_bad: whether bad gears are left out.
         range: working range.
 
@@ -100,7 +100,7 @@ def read_gear_folder(
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
     whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
-    about = [f"each {kind} is a gear, called after it, unless it names gears itself"]
+    about = [f"each {kind} is a gear of that name, unless it has a column of gears"]
     compared = f"the gear file, with sizes at which gears are compared, is {base}"
     about += [*([compared] if own else []), *not_read(files, folder)]
     about += _stated_by_some([part.stated for part, _ in parts])

@@ -28,7 +28,7 @@ def read_columns(
     Args:
         data: the file, or a table in memory.
         mapping: quantity -> header with its unit in brackets, or None.
-        findings: of the source; gets one for everything that is wrong.
+        findings: gets one for everything that is wrong.
         quantities: to look for.
         required: which of them must be there.
         fewest: rows that are needed.

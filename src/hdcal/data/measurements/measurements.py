@@ -114,8 +114,8 @@ def read_measurements(
         data: the file, or a table in memory (see `read_source`).
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
-        encoding: of the text; by default the likeliest.
-        sheet: of a workbook; by default the one with readings.
+        encoding: encoding of a text; by default the likeliest.
+        sheet: sheet of a workbook; by default the one with readings.
         gear: whose radius bounds the deformations; None where it is unknown.
         skip_bad: True leaves out gears with a faulty row, whole; False refuses them
             and mentions this option.

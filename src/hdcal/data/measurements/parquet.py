@@ -48,11 +48,11 @@ class Parquet:
     """Files that are read in batches.
 
     Attributes:
-        name: of the file, or of the folder.
+        name: name of the file or folder.
         gear: common to all gears.
         files: in their order.
-        root: of their folder; empty where there is one file.
-        schema: of all files.
+        root: their folder; empty where there is one file.
+        schema: columns of all files.
         used: columns by quantity.
         named: as in `Measurements`.
         notes: what was assumed.

@@ -177,7 +177,7 @@ def _joined(
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
     orders = [_order(heading, main) for heading in headings]
     foreign = [h.row for h, order in zip(headings, orders, strict=True) if not order]
-    words = "the columns are others than those of the first block"
+    words = "the columns differ from those of the first block"
     remedy = "Name them alike, or split the file"
     findings.add_rows((row, words, remedy) for row in foreign)
     usual = [*range(grid.width)]

@@ -40,7 +40,7 @@ class Column:
         quantity: one of QUANTITIES.
         header: as written in the file.
         position: 0 = first column.
-        unit: of its numbers; None for labels.
+        unit: unit of its numbers; None for labels.
         guessed: its header is not spelt `quantity_unit`.
         against: another unit, which its header names itself.
     """

@@ -21,7 +21,7 @@ class SourceLine(NamedTuple):
     """A row of a source that is no reading, or not yet known to be one.
 
     Attributes:
-        row: of the source, 1 = first.
+        row: its number in the source, 1 = first.
         cells: texts without blanks around them.
         fits: whether it is a row of the grid, as readings are.
     """
@@ -103,7 +103,7 @@ class TextGrid(Grid):
     """Lines of a text with as many cells each.
 
     Attributes:
-        separator: of the cells.
+        separator: character between cells.
         text: the lines.
         quoted: some cells stand in quotation marks.
     """

@@ -31,7 +31,7 @@ class OtherLines:
     Args:
         width: cells of a reading.
         counted: positions of the columns that hold numbers.
-        findings: of the source.
+        findings: findings on the source.
 
     Attributes:
         spoilt: rows of readings with a bad cell.

@@ -51,9 +51,9 @@ def read_source(
 
     Args:
         data: a path, a DataFrame, or arrays by name.
-        findings: of the source.
-        encoding: of a text; by default the likeliest.
-        sheet: of a workbook; by default the only one with readings.
+        findings: findings on the source.
+        encoding: encoding of a text; by default the likeliest.
+        sheet: sheet of a workbook; by default the only one with readings.
 
     Raises:
         InputError: it holds no table, or it is not clear which one is meant.

@@ -37,7 +37,7 @@ def sheet_grid(
     if len(likely) > 1:
         words = f"{len(likely)} sheets hold a table: {_listed(likely)}"
         findings.refuse(words, _WHICH)
-    note = f"sheet {quoted(likely[0])} is meant. If not, name the sheet"
+    note = f"sheet {quoted(likely[0])} is read. If another is meant, name it"
     return _grid(sheets[likely[0]]), [note] if len(sheets) > 1 else []
 
 
