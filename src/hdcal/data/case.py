@@ -47,7 +47,7 @@ class Gear:
         dynamic_priors: priors of a moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.
         density: density of the material [N·s²/mm⁴], None where its file states none.
-        gauge_priors: priors of the gauges' gains and the thermometer's offset, those that a
+        gauge_priors: priors of the gauges' gains and the thermometer's offset that a
             certificate states: keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
     """
@@ -104,8 +104,8 @@ class Case:
             way, or for a working range: ends of each stretch [mm].
         excluded_sense: sign of the movement whose readings were left out, where one
             branch alone was chosen; 0 where none was.
-        screening: result for the whole record before rows were cut; None where the rows are
-            not those of a file.
+        screening: result for the whole record before rows were cut; None where the
+            rows are not those of a file.
         units: names and units of force and deformation; of a torsional spring they
             are a torque [N·m] and an angle [rad].
     """

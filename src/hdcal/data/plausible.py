@@ -18,6 +18,8 @@ class Range(NamedTuple):
         unit: unit of both; empty for counts and shares.
         why: what the ends stand for.
         inner: whether the ends themselves are out.
+        written: factor to the unit in which people write it, and that unit, where it
+            is another one.
     """
 
     low: float
@@ -25,6 +27,7 @@ class Range(NamedTuple):
     unit: str
     why: str
     inner: bool = False
+    written: tuple[float, str] | None = None
 
     @property
     def whole(self) -> bool:
@@ -39,15 +42,17 @@ class Range(NamedTuple):
 
     def problem(self) -> str:
         """Return in words what is wrong with any other number."""
-        ends = f"{self.low:.15g} and {self.high:.15g} {self.unit}".rstrip()
+        factor, unit = self.written or (1, self.unit)
+        ends = f"{self.low * factor:.15g} and {self.high * factor:.15g} {unit}".rstrip()
         return f"does not lie between {ends}: {self.why}"
 
     def shown(self, number: float) -> str:
         """Return a number with its unit, as people write it."""
+        factor, unit = self.written or (1, self.unit)
         try:
-            return f"{number:.6g} {self.unit}".rstrip()
+            return f"{number * factor:.6g} {unit}".rstrip()
         except OverflowError:
-            return f"a number of more than 300 digits {self.unit}".rstrip()
+            return f"a number of more than 300 digits {unit}".rstrip()
 
 
 _SCATTER = "from nothing to as large as the largest force"
@@ -80,7 +85,7 @@ RANGES = {
     "correlation": Range(0.0, 1.0, "", "from independent to all alike"),
     "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
     "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
-    "mass": Range(1e-15, 1e6, "t", _MASS),
+    "mass": Range(1e-15, 1e6, "N·s²/mm", _MASS, written=(1e3, "kg")),
     "damping_ratio": Range(1e-9, 1e3, "", "from a bell to tar"),
     "initial_velocity": Range(-1e9, 1e9, "mm/s", "far beyond the speed of sound"),
     "deformation_sigma": Range(1e-15, 1e3, "mm", "from nothing to a metre"),
