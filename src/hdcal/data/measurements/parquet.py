@@ -27,6 +27,7 @@ from hdcal.data.tables.columns import (
 )
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.tables.parquet_files import (
+    frame_of,
     parquet_files,
     parquet_table,
     plain_columns,
@@ -104,8 +105,7 @@ def open_parquet(
         common, notes = gear_of(gear, nearby, False, (theory, reading))
         named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
-        frame = first.to_pandas(strings_to_categorical=True)
-        table = table_of(frame_grid(frame), findings)
+        table = table_of(frame_grid(frame_of(first)), findings)
         chosen = choose_columns(table, named, _USED, REQUIRED, findings)
         used = in_place_of_force(chosen)
         if "specimen" not in used:
@@ -142,10 +142,11 @@ def read_batches(
     wanted = asked_range(source.range)
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
-            frame = rows.to_pandas(strings_to_categorical=True)
+            frame = frame_of(rows)
             # Times would be as many labels as rows: of dates the day counts.
-            times = frame.select_dtypes(["datetime", "datetimetz"])
-            frame[times.columns] = times.apply(_days)
+            for name in frame.select_dtypes(["datetime", "datetimetz"]):
+                days = frame[name].dt.tz_localize(None).dt.normalize()
+                frame[name] = days.astype("category")
             grid = frame_grid(frame, first)
             table = ReadTable(tuple(headers), first, grid, rows.num_rows)
             how: dict = {"skip_bad": skip_bad, "whole": False}
@@ -154,11 +155,6 @@ def read_batches(
             read, screening = screened(read, wanted, skip_bad, whole=False)
             read = replace(read, notes=tuple(screening_notes(screening, read.units)))
         yield read
-
-
-def _days(times: pd.Series) -> pd.Series:
-    """Return the days of times, in their time zone."""
-    return times.dt.tz_localize(None).dt.normalize().astype("category")
 
 
 def _whole_gears(

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.grid import ArrayGrid
@@ -11,7 +13,7 @@ from hdcal.data.tables.headers import parse_header
 from hdcal.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from pyarrow import Schema
+    from pyarrow import Schema, Table
     from pyarrow.dataset import Dataset
 
 # First bytes of a Parquet file.
@@ -108,6 +110,17 @@ def plain_columns(schema: "Schema") -> list[str]:
     return [field.name for field in schema if not types.is_nested(field.type)]
 
 
+def frame_of(table: "Table") -> pd.DataFrame:
+    """Return a table of Arrow as a DataFrame, its texts as categories."""
+    from pyarrow import types
+
+    for place, field in enumerate(table.schema):
+        if types.is_string(field.type) or types.is_large_string(field.type):
+            coded = table.column(place).dictionary_encode()
+            table = table.set_column(place, field.name, coded)
+    return table.to_pandas()
+
+
 def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
     """Return the grid of a Parquet file.
 
@@ -116,4 +129,4 @@ def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
     """
     dataset = parquet_table([str(path)], "", findings)
     table = dataset.to_table(columns=plain_columns(dataset.schema), use_threads=False)
-    return frame_grid(table.to_pandas(strings_to_categorical=True))
+    return frame_grid(frame_of(table))
