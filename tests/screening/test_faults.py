@@ -94,6 +94,15 @@ def test_noise_about_one_level_has_no_jump(rows):
     assert not [kind for kind in kinds if "jump" in kind]
 
 
+def test_the_knee_of_a_preload_is_no_jump():
+    """An extension spring with slack, whose coils open at 30 N within two rows."""
+    x = np.arange(120) / 3.0
+    y = np.interp(x, [0.0, 1.2, 1.7, 40.0], [0.0, 0.0, 30.0, 30.0 + 2.1 * 38.3])
+    found = screen(x, y + RNG.normal(0.0, 0.03, x.size))
+    assert not found.observations
+    assert found.straight.slope == pytest.approx(2.1, rel=0.01)
+
+
 def contact_cycles(seed=0, friction=0.0, play=0.0):
     """Three cycles of 50 N/mm to 10 mm with contact from 3 mm on, 600 rows.
 

@@ -29,6 +29,8 @@ _NEAR = np.r_[1 - REACH : 0, 1:REACH]
 _TRIED = 5
 # Slopes on both sides agree when they differ by less than this share.
 _ALIKE = 0.5
+# Share of the gap between both sides of a jump that one step makes.
+_ONE_STEP = 0.8
 # Share of the range within which nothing moves.
 _STILL = 0.02
 # Both channels jumped when one leaves its sequence at least this share as far, and by
@@ -194,6 +196,8 @@ def _jump(
     in_cycles: bool,
 ) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it."""
+    if not in_cycles and not _in_one_step(x, y, row, reach, scatter):
+        return None
     jump = _measured(x, y, row, reach, scatter)
     if abs(jump.deformation) < LEAST * spread(x) and abs(jump.force) < LEAST * spread(
         y
@@ -241,6 +245,25 @@ def _measured(
     if ratio[1] >= ratio[0]:
         return Jump(row, "force", 0.0, rise - slope * run if known else off[1])
     return Jump(row, "deformation", run - rise / slope if known else off[0], 0.0)
+
+
+def _in_one_step(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> bool:
+    """Tell whether one step makes up the gap between both sides, within the noise.
+
+    At the knee of a preload several steps do.
+    """
+    before, after = slice(max(row - reach, 0), row), slice(row, row + reach)
+    runs = [np.diff(x[part]) for part in (before, after)]
+    rises = [np.diff(y[part]) for part in (before, after)]
+    run, rise = np.concatenate(runs), np.concatenate(rises)
+    moved = run != 0.0
+    slope = float(np.median(rise[moved] / run[moved])) if moved.any() else 0.0
+    left = y - slope * x
+    gap = float(np.median(left[after]) - np.median(left[before]))
+    blur = noise_sd(y, fewest=3) + abs(slope) * scatter
+    return abs(left[row] - left[row - 1]) + 4.0 * blur >= _ONE_STEP * abs(gap)
 
 
 def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
