@@ -35,9 +35,7 @@ def false_alarms(count: int, rng: np.random.Generator) -> None:
             alarms = 0
             for _ in range(each):
                 record = clean_record(rng, kind, noise)
-                found = screen(
-                    record.deformation, record.force, record.time, record.run
-                )
+                found = screen(record.deformation, record.force, record.run)
                 alarms += bool(found.observations)
                 what.update({one.kind for one in found.observations})
             cells.append(f"{alarms} of {each}")
@@ -56,7 +54,7 @@ def power(count: int, rng: np.random.Generator) -> None:
         found, seen, other = Counter(), Counter(), Counter()
         for _ in range(count):
             spring = faulty_spring(rng, [name])
-            result = screen(spring.deformation, spring.force, spring.time)
+            result = screen(spring.deformation, spring.force)
             kinds = {one.kind for one in result.observations}
             size = int(np.searchsorted(SIZES, abs(spring.faults[name])))
             seen[size] += 1

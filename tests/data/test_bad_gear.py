@@ -1,4 +1,4 @@
-"""A bad gear file is refused with every finding at its key."""
+"""A bad gear file is refused with every finding at its key and row."""
 
 import pytest
 
@@ -8,132 +8,18 @@ from hdcal.errors import InputError
 
 SIZES = "wall_thickness_mm = 0.68\nradius_mm = 40.0\nlength_mm = 70.0\n"
 GEAR = "[gear]\n" + SIZES
+M = GEAR + "[measurement]\n"
 P = GEAR + "[priors]\n"
-
-# text, (row, key, words) of every finding
+# Text, and (row, key, words) of every finding.
 CASES = {
     "empty": ("", [(None, "gear", "missing")]),
     "no sizes": (
         "[gear]\n",
         [
-            (1, f"gear.{s}_mm", "or take the theory 'spring'")
-            for s in ("wall_thickness", "radius", "length")
+            (1, f"gear.{size}_mm", "or take the theory 'spring'")
+            for size in ("wall_thickness", "radius", "length")
         ],
     ),
-    "unknown key": (GEAR + "lenght_mm = 3\n", [(5, "gear.lenght_mm", "'length_mm'")]),
-    "unknown table": (GEAR + "[measurment]\n", [(5, "measurment", "'measurement'")]),
-    "wall too thick": (
-        GEAR.replace("0.68", "40.0"),
-        [(2, "gear.wall_thickness_mm", "not thinner")],
-    ),
-    "negative": (
-        GEAR.replace("0.68", "-1"),
-        [(2, "gear.wall_thickness_mm", "-1 mm does not lie")],
-    ),
-    "zero": (GEAR.replace("70.0", "0"), [(4, "gear.length_mm", "0 mm does not lie")]),
-    "nan": (GEAR.replace("70.0", "nan"), [(4, "gear.length_mm", "finite")]),
-    "inf": (GEAR.replace("70.0", "inf"), [(4, "gear.length_mm", "")]),
-    "text": (GEAR.replace("70.0", '"70"'), [(4, "gear.length_mm", "number")]),
-    "bool": (GEAR.replace("70.0", "true"), [(4, "gear.length_mm", "number")]),
-    "huge": (GEAR.replace("70.0", "1" + "0" * 400), [(4, "gear.length_mm", "")]),
-    "metres": (GEAR.replace("70.0", "1e9"), [(4, "gear.length_mm", "does not lie")]),
-    "material": (
-        GEAR + 'material = "40CrNiMo"\n',
-        [(5, "gear.material", "'40CrNiMoA'")],
-    ),
-    "material file": (GEAR + 'material = "my.toml"\n', [(None, None, "not exist")]),
-    "reserved": (
-        GEAR + 'material = "rig"\n',
-        [(5, "gear.material", "unknown material")],
-    ),
-    "theory": (GEAR + 'theory = "cups"\n', [(5, "gear.theory", "'cup'")]),
-    "load height": (
-        GEAR + "load_height_mm = 71\n",
-        [(5, "gear.load_height_mm", "beyond the length")],
-    ),
-    "nominal": (
-        GEAR + "nominal_deformation_mm = 40\n",
-        [(5, "gear.nominal_deformation_mm", "below the radius")],
-    ),
-    "reading": (
-        GEAR + '[measurement]\ndeformation = "diameter"\n',
-        [(6, "measurement.deformation", "'diametral'")],
-    ),
-    "too cold": (
-        GEAR + "[measurement]\nreference_temperature_C = -300\n",
-        [(6, "measurement.reference_temperature_C", "absolute zero")],
-    ),
-    "resolution": (
-        GEAR + "[measurement]\nforce_resolution_N = 0\n",
-        [(6, "measurement.force_resolution_N", "0 N does not lie")],
-    ),
-    "gear is a number": ("gear = 3\n", [(1, "gear", "")]),
-    "priors is a number": ("priors = 3\n" + GEAR, [(1, "priors", "")]),
-    "prior unknown": (
-        P + 'Eo = { family = "normal" }\n',
-        [(6, "priors.Eo", "'E0'")],
-    ),
-    "prior is a number": (P + "K = 2.0\n", [(6, "priors.K", "not a table")]),
-    "no family": (P + "K = { median = 2 }\n", [(6, "priors.K.family", "is missing")]),
-    "family": (
-        P + 'K = { family = "log-normal", median = 2, log_sd = 1 }\n',
-        [(6, "priors.K.family", "'lognormal'")],
-    ),
-    "number missing": (
-        P + 'K = { family = "lognormal", median = 2 }\n',
-        [(6, "priors.K.log_sd", "is missing")],
-    ),
-    "number extra": (
-        P + 'K = { family = "lognormal", median = 2, log_sd = 1, sd = 1 }\n',
-        [(6, "priors.K.sd", "unknown key")],
-    ),
-    "sd negative": (
-        P + 'force_offset = { family = "normal", mean = 0, sd = -1 }\n',
-        [(6, "priors.force_offset.sd", "not positive")],
-    ),
-    "number inf": (
-        P + 'force_offset = { family = "normal", mean = inf, sd = 1 }\n',
-        [(6, "priors.force_offset.mean", "finite")],
-    ),
-    "low above high": (
-        P + 'K = { family = "uniform", low = 3, high = 2 }\n',
-        [(6, "priors.K.high", "not below")],
-    ),
-    "K negative": (
-        P + 'K = { family = "normal", mean = -2, sd = 1 }\n',
-        [(6, "priors.K.mean", "does not lie")],
-    ),
-    "no unit": (
-        P + 'E0 = { family = "normal", mean = 207, sd = 3 }\n',
-        [(6, "priors.E0", "without a unit")],
-    ),
-    "wrong dimension": (
-        P + 'E0 = { family = "normal", mean = 207, sd = 3, unit = "N" }\n',
-        [(6, "priors.E0.unit", "does not measure")],
-    ),
-    "no such unit": (
-        P + 'E0 = { family = "normal", mean = 207, sd = 3, unit = "GigaPa" }\n',
-        [(6, "priors.E0.unit", "not a unit")],
-    ),
-    "unit is a sum": (
-        P + 'E0 = { family = "normal", mean = 1, sd = 1, unit = "9**9**9**9" }\n',
-        [(6, "priors.E0.unit", "not a unit")],
-    ),
-    "effect family": (
-        GEAR + "[priors.coulomb_friction]\nforce = { family = 'cauchy' }\n",
-        [(6, "priors.coulomb_friction.force.family", "unknown choice")],
-    ),
-    "effect unit": (
-        GEAR + "[priors.slack]\nc = { family = 'half_normal', sd = 1, unit = 'mA' }\n",
-        [(6, "priors.slack.c.unit", "is not a unit")],
-    ),
-    "effect no table": (
-        GEAR + "[priors.slack]\nclearance = 3\n",
-        [(6, "priors.slack.clearance", "not a table")],
-    ),
-    "duplicate key": (GEAR + "radius_mm = 3\n", [(5, None, "not TOML")]),
-    "syntax": (GEAR + "name = \n", [(5, None, "not TOML")]),
-    "deep": (GEAR + "name = " + "[" * 5000, [(None, None, "not TOML")]),
     "four at once": (
         "[gear]\nwall_thicknes_mm = 1\nradius_mm = -4\nlength_mm = 70\n"
         'material = "stel"\n[measurement]\ndeformation = "radius"\n'
@@ -148,10 +34,82 @@ CASES = {
         ],
     ),
 }
+# Text, row, key and words of the only finding.
+ONE = [
+    (GEAR + "lenght_mm = 3\n", 5, "gear.lenght_mm", "'length_mm'"),
+    (GEAR + "[measurment]\n", 5, "measurment", "'measurement'"),
+    (GEAR.replace("0.68", "40.0"), 2, "gear.wall_thickness_mm", "not thinner"),
+    (GEAR.replace("0.68", "-1"), 2, "gear.wall_thickness_mm", "-1 mm does not lie"),
+    (GEAR.replace("70.0", "nan"), 4, "gear.length_mm", "finite"),
+    (GEAR.replace("70.0", '"70"'), 4, "gear.length_mm", "number"),
+    (GEAR.replace("70.0", "1e9"), 4, "gear.length_mm", "does not lie"),
+    (GEAR + 'material = "40CrNiMo"\n', 5, "gear.material", "'40CrNiMoA'"),
+    (GEAR + 'material = "my.toml"\n', None, None, "not exist"),
+    (GEAR + 'theory = "cups"\n', 5, "gear.theory", "'cup'"),
+    (GEAR + "load_height_mm = 71\n", 5, "gear.load_height_mm", "beyond the length"),
+    (
+        GEAR + "nominal_deformation_mm = 40\n",
+        *(5, "gear.nominal_deformation_mm", "below the radius"),
+    ),
+    (M + 'deformation = "diameter"\n', 6, "measurement.deformation", "'diametral'"),
+    ("priors = 3\n" + GEAR, 1, "priors", ""),
+    (GEAR + "radius_mm = 3\n", 5, None, "not TOML"),
+    (GEAR + "name = " + "[" * 5000, None, None, "not TOML"),
+    (GEAR + "[rig]\nfilter_Hz = inf\n", 6, "rig.filter_Hz", "finite"),
+    (GEAR + "[rig]\ngauge_rage_mm = 5.0\n", 6, "rig.gauge_rage_mm", "'gauge_range_mm'"),
+    (P + 'Eo = { family = "normal" }\n', 6, "priors.Eo", "'E0'"),
+    (P + "force_gain = { family = 'fixed', value = 1 }\n", 6, "priors.force_gain", ""),
+    (P + "K = 2.0\n", 6, "priors.K", "not a table"),
+    (P + "K = { median = 2 }\n", 6, "priors.K.family", "is missing"),
+    (GEAR + "[priors.slack]\nclearance = 3\n", 6, "priors.slack.clearance", "table"),
+]
+# Entry of [priors], key within it, and words.
+ENTRIES = [
+    ("K", "family = 'log-normal', median = 2, log_sd = 1", ".family", "'lognormal'"),
+    ("K", "family = 'lognormal', median = 2", ".log_sd", "is missing"),
+    ("K", "family = 'lognormal', median = 2, log_sd = 1, sd = 1", ".sd", "unknown key"),
+    ("K", "family = 'uniform', low = 3, high = 2", ".high", "not below"),
+    ("K", "family = 'normal', mean = -2, sd = 1", ".mean", "does not lie"),
+    ("sigma", "family = 'half_normal', sd = -1", ".sd", "not positive"),
+    ("E0", "family = 'normal', mean = 207, sd = 3", "", "without a unit"),
+    ("E0", "family = 'normal', mean = 7, sd = 3, unit = 'N'", ".unit", "not measure"),
+    ("E0", "family = 'normal', mean = 7, sd = 3, unit = '9**9'", ".unit", "not a unit"),
+    ("slack.c", "family = 'half_normal', sd = 1, unit = 'mA'", ".unit", "not a unit"),
+    ("noise_correlation", "family = 'fixed', value = 1.0", ".value", "below 1"),
+    ("noise_correlation", "family = 'uniform', low = 0, high = 1.5", ".high", "1"),
+    ("noise_correlation", "family = 'uniform', low = -0.5, high = 0.5", ".low", "0"),
+    ("noise_correlation", "family = 'normal', mean = 0.3, sd = 0.3", ".family", "1"),
+]
+ONE += [
+    (f"{P}{name} = {{ {entry} }}\n", 6, f"priors.{name}{key}", words)
+    for name, entry, key, words in ENTRIES
+]
+# Force certificate, key within it, and words.
+CERTIFICATES = [
+    ("", "", "states no uncertainty"),
+    ("expanded_percnt = 1", ".expanded_percnt", "'expanded_percent'"),
+    ("expanded_mm = 1", ".expanded_mm", "unknown key"),
+    ('expanded_percent = 1, iso376_class = "1"', "", "states one gain"),
+    ('iso376_class = "0"', ".iso376_class", "unknown choice"),
+    ('iso376_class = "1", k = 2', "", "Leave k out"),
+    ("expanded_N = 1, k = 0.5", ".k", "does not lie"),
+    ("expanded_percent = -1", ".expanded_percent", "does not lie"),
+    ("expanded_percent = 25", ".expanded_percent", "20 %"),
+]
+ONE += [
+    (
+        f"{M}force_calibration = {{ {stated} }}\n",
+        *(6, f"measurement.force_calibration{key}", words),
+    )
+    for stated, key, words in CERTIFICATES
+]
+CASES |= {
+    f"{place}: {where[1]}": (text, [where]) for place, (text, *where) in enumerate(ONE)
+}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_bad_gear(tmp_path, name):
+def test_every_finding_is_at_its_key(tmp_path, name):
     text, expected = CASES[name]
     path = tmp_path / "gear.toml"
     path.write_text(text)
@@ -159,10 +117,10 @@ def test_bad_gear(tmp_path, name):
         read_gear(path)
     findings = caught.value.findings
     assert len(findings) == len(expected), [str(f) for f in findings]
-    found = {f.column: f for f in findings}
+    by_key = {f.column: f for f in findings}
     for row, key, words in expected:
-        assert found[key].row == row
-        assert words in f"{found[key].problem}. {found[key].remedy}"
+        assert by_key[key].row == row
+        assert words in f"{by_key[key].problem}. {by_key[key].remedy}"
 
 
 @pytest.mark.parametrize(
@@ -186,36 +144,3 @@ def test_table_and_gear_are_reported_together(folder):
         read_case(folder)
     files = [f.file.rpartition("/")[2] for f in caught.value.findings]
     assert files == ["data.csv"] + ["gear.toml"] * 3
-
-
-def test_theory_of_the_command_line(folder):
-    with pytest.raises(InputError, match="Did you mean 'article'"):
-        read_case(folder, theory="artikel")
-
-
-def test_two_thousand_unknown_keys_have_a_row_each(tmp_path):
-    path = tmp_path / "gear.toml"
-    path.write_text(GEAR + "".join(f"key_{i} = {i}\n" for i in range(2000)))
-    with pytest.raises(InputError) as caught:
-        read_gear(path)
-    found = {f.column: f.row for f in caught.value.findings}
-    assert found == {f"gear.key_{i}": 5 + i for i in range(2000)}
-
-
-@pytest.mark.parametrize(
-    ("gear", "keys"),
-    [
-        ({1: 2}, ["1"]),
-        ({"priors": {3: {"family": "fixed", "value": 1.0}}}, ["priors.3"]),
-        ({"gear": {None: 1, "radius_mm": 40.0}, 2.5: 0}, ["gear.None", "2.5"]),
-    ],
-)
-def test_keys_that_are_no_text_are_refused(gear, keys):
-    with pytest.raises(InputError) as caught:
-        read_case({"deformation_mm": range(6), "force_N": range(6)}, gear=gear)
-    assert [finding.column for finding in caught.value.findings] == keys
-
-
-def test_a_column_named_by_no_text_is_refused():
-    with pytest.raises(InputError):
-        read_case({"deformation_mm": range(6), "force_N": range(6)}, columns={1: "b"})

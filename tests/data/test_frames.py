@@ -1,8 +1,9 @@
-"""A table in memory is read as its file would be, to the last digit."""
+"""Tables in memory, of Parquet and of MATLAB files are read to the last digit."""
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 import hdcal
 from hdcal.errors import InputError
@@ -16,125 +17,108 @@ FRAME = pd.DataFrame(
         "time_s": np.arange(9.0),
     }
 )
+X, KN = (FRAME[name].to_numpy() for name in ("deformation_mm", "Kraft [kN]"))
+SIZES = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
 
 
-@pytest.mark.parametrize("kind", ["frame", "arrays", "becomes one"])
-def test_it_says_what_its_file_says(folder, kind):
-    class Other:
-        """Another library's table."""
+class Other:
+    """A table of another library."""
 
-        def to_pandas(self):
-            return FRAME
-
-    given = {"frame": FRAME, "arrays": dict(FRAME), "becomes one": Other()}[kind]
-    FRAME.to_csv(folder / "log.csv", index=False)
-    gear = folder / "gear.toml"
-    found, read = (
-        hdcal.read_case(given, gear),
-        hdcal.read_case(folder / "log.csv", gear),
-    )
-    for name in ("deformation", "force", "time", "run", "sense"):
-        np.testing.assert_array_equal(
-            getattr(found.records, name), getattr(read.records, name)
-        )
-    np.testing.assert_array_equal(found.records.deformation, FRAME["deformation_mm"])
-    assert found.run_labels == ("a", "b")
-    assert found.name == "DataFrame"
-    assert "'Kraft [kN]' is the force in kN" in found.notes[0]
+    def to_pandas(self):
+        return FRAME
 
 
-def test_what_is_wrong_is_told_by_row_and_column(folder):
-    wrong = FRAME.assign(**{"Kraft [kN]": [*FRAME["Kraft [kN]"][:-1], np.nan]})
+@pytest.mark.parametrize(
+    "kind", ["csv", "frame", "arrays", "other", "index", "parquet"]
+)
+def test_every_kind_of_table_is_the_same_case(tmp_path, kind):
+    FRAME.to_csv(tmp_path / "log.csv", index=False)
+    FRAME.assign(trace=[[1.0]] * 9).to_parquet(tmp_path / "log.parquet")
+    kinds = {"csv": tmp_path / "log.csv", "parquet": tmp_path / "log.parquet"}
+    kinds |= {"frame": FRAME, "arrays": dict(FRAME), "other": Other()}
+    kinds |= {"index": FRAME.set_index(["run", "time_s"])}
+    case = hdcal.read_case(kinds[kind])
+    np.testing.assert_array_equal(case.records.deformation, X)
+    np.testing.assert_array_equal(case.records.force, 1000.0 * KN)
+    np.testing.assert_array_equal(case.records.time, FRAME["time_s"])
+    assert case.run_labels == ("a", "b")
+    assert (case.gear.theory, case.gear.name) == ("spring", "part")
+    assert any("'Kraft [kN]' is the force in kN" in note for note in case.notes)
+    again = hdcal.read_case(case.to_frame())
+    np.testing.assert_array_equal(again.records.force, case.records.force)
+
+
+def test_a_finding_names_row_and_column(folder):
+    wrong = FRAME.assign(**{"Kraft [kN]": [*KN[:-1], np.nan]})
     with pytest.raises(InputError) as caught:
         hdcal.read_case(wrong, folder / "gear.toml")
     (found,) = caught.value.findings
     assert (found.file, found.row, found.column) == ("DataFrame", 10, "Kraft [kN]")
-    unequal = {"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}
-    with pytest.raises(InputError, match="is no table"):
-        hdcal.read_case(unequal, folder / "gear.toml")
-    with pytest.raises(InputError, match="no gear file says the sizes"):
-        hdcal.read_case(FRAME, theory="ring")
+    for data, words in (
+        ({"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}, "is no table"),
+        (pd.concat({"rig": FRAME}, axis=1), "columns of several levels"),
+        (3, "is a int"),
+    ):
+        with pytest.raises(InputError, match=words):
+            hdcal.read_case(data)
 
 
-def test_columns_that_are_only_counted_have_no_headers():
-    """The names 0 and 1 are no reading."""
-    counted = pd.DataFrame(FRAME[["deformation_mm", "Kraft [kN]"]].to_numpy())
-    asked = {"deformation": "1[mm]", "force": "2[kN]"}
-    found = hdcal.read_case(counted, columns=asked)
-    np.testing.assert_array_equal(found.records.deformation, FRAME["deformation_mm"])
-    with pytest.raises(InputError, match="numbers where the headers should be"):
-        hdcal.read_case(counted)
+def test_columns_that_are_only_counted_have_no_headers(tmp_path):
+    """The names 0 and 1 are no reading; a matrix of MATLAB has none either."""
+    counted = np.stack([X, KN], axis=1)
+    savemat(tmp_path / "a.mat", {"data": counted})
+    for data in (pd.DataFrame(counted), tmp_path / "a.mat"):
+        asked = {"deformation": "1[mm]", "force": "2[kN]"}
+        case = hdcal.read_case(data, columns=asked)
+        np.testing.assert_array_equal(case.records.deformation, X)
+        with pytest.raises(InputError, match="numbers where the headers should be"):
+            hdcal.read_case(data)
+
+
+@pytest.mark.parametrize("shape", [(9,), (9, 1), (1, 9)])
+def test_vectors_of_a_mat_file(tmp_path, shape):
+    """Among what else a workspace holds: a rate, a name, a picture, a structure."""
+    vectors = {"deformation_mm": X.reshape(shape), "F": KN.reshape(shape)}
+    others = {"fs": 2500.0, "who": "M. K.", "picture": np.zeros((30, 40))}
+    for content in (vectors | others, {"log": vectors}):
+        savemat(tmp_path / "a.mat", content)
+        case = hdcal.read_case(tmp_path / "a.mat", columns={"force": "F[kN]"})
+        np.testing.assert_array_equal(case.records.force, 1000.0 * KN)
+    savemat(tmp_path / "a.mat", {"up": vectors, "down": vectors})
+    with pytest.raises(InputError, match="holds no one table"):
+        hdcal.read_case(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("begins", [b"PAR1", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n"])
+def test_a_broken_file_is_refused(tmp_path, begins):
+    (tmp_path / "a").write_bytes(begins + bytes(range(256)) * 4)
+    with pytest.raises(InputError, match=r"is (no|an) \S+ file"):
+        hdcal.read_case(tmp_path / "a")
 
 
 def test_a_gear_may_be_stated_in_memory():
-    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
-    found = hdcal.read_case(FRAME, {**sizes, "deformation": "diametral"})
-    assert (found.gear.theory, found.gear.reading) == ("ring", "diametral")
-    same = {"gear": sizes, "measurement": {"deformation": "diametral"}}
-    assert hdcal.read_case(FRAME, same).gear == found.gear
-    # Whatever comes first, and what was handed over stays as it is.
-    late = {"deformation": "diametral", **sizes, "measurement": {}}
+    case = hdcal.read_case(FRAME, {**SIZES, "deformation": "diametral"})
+    assert (case.gear.theory, case.gear.reading) == ("ring", "diametral")
+    same = {"gear": SIZES, "measurement": {"deformation": "diametral"}}
+    assert hdcal.read_case(FRAME, same).gear == case.gear
+    # Whatever comes first, and the mapping that was given stays as it is.
+    late = {"deformation": "diametral", **SIZES, "measurement": {}}
     assert hdcal.read_case(FRAME, late).gear.reading == "diametral"
     assert late["measurement"] == {}
-    for wrong in ({"gear": "x", **sizes}, {"measurement": 3, **late, **same}):
-        with pytest.raises(InputError):
-            hdcal.read_case(FRAME, {**wrong, "deformation": "radial"})
-    with pytest.raises(InputError, match="unknown key") as caught:
-        hdcal.read_case(FRAME, {**sizes, "radius": 40.0})
-    assert str(caught.value.findings[0]).startswith("gear, column 'gear.radius'")
+    for wrong, words in (
+        ({"gear": "x", **SIZES}, "gear"),
+        ({**same, "deformation": "radial"}, "stated twice"),
+        ({**SIZES, 1: 2}, "unknown key"),
+    ):
+        with pytest.raises(InputError, match=words):
+            hdcal.read_case(FRAME, wrong)
 
 
-def test_without_a_gear_a_stiffness_is_asked():
-    found = hdcal.read_case(FRAME)
-    assert (found.gear.theory, found.gear.name) == ("spring", "part")
-    assert "its stiffness is asked, no K" in " ".join(found.notes)
-
-
-def test_an_index_with_a_name_is_a_column():
-    found = hdcal.read_case(FRAME.set_index(["run", "time_s"]))
-    assert found.run_labels == ("a", "b") and "time" in found.records.known
-
-
-def test_a_unit_against_its_header_is_told():
+def test_a_unit_against_its_header_has_a_note():
     table = FRAME.rename(columns={"deformation_mm": "disp_um", "Kraft [kN]": "F_kN"})
     case = hdcal.read_case(table)
-    assert case.records.deformation.max() == FRAME["deformation_mm"].max() / 1000.0
-    np.testing.assert_array_equal(
-        case.records.force, hdcal.read_case(FRAME).records.force
-    )
+    assert case.records.deformation.max() == X.max() / 1000.0
+    np.testing.assert_array_equal(case.records.force, 1000.0 * KN)
     case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
-    assert case.records.force.max() == FRAME["Kraft [kN]"].max()
-    assert any("in N, as was stated, though it names kN" in n for n in case.notes)
-
-
-def test_columns_are_named_in_a_mapping():
-    with pytest.raises(InputError, match="is no mapping"):
-        hdcal.read_case(FRAME, columns=["force=Kraft [kN]"])
-    plain = FRAME.rename(columns={"Kraft [kN]": "load cell 2 kN"})
-    case = hdcal.read_case(plain, columns={"force": "2[kN]"})
-    assert case.records.force.max() == 1000.0 * FRAME["Kraft [kN]"].max()
-
-
-def test_steel_is_assumed_aloud():
-    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
-    silent = hdcal.read_case(FRAME, sizes)
-    assert any("the gear is of steel" in note for note in silent.notes)
-    told = hdcal.read_case(FRAME, {**sizes, "material": "17-4PH"})
-    assert not any("the gear is of steel" in note for note in told.notes)
-
-
-def test_headers_of_several_levels_are_refused(folder):
-    stacked = pd.concat({"rig": FRAME}, axis=1)
-    with pytest.raises(InputError, match="columns of several levels"):
-        hdcal.read_case(stacked, folder / "gear.toml")
-
-
-def test_a_case_returns_to_the_table_it_was_read_from(folder):
-    """What `to_frame` gives is read as the same case again."""
-    case = hdcal.read_case(FRAME, folder / "gear.toml")
-    again = hdcal.read_case(case.to_frame(), folder / "gear.toml")
-    assert again.run_labels == case.run_labels
-    for name in ("deformation", "force", "time", "run", "sense", "force_sd"):
-        np.testing.assert_array_equal(
-            getattr(again.records, name), getattr(case.records, name)
-        )
+    assert case.records.force.max() == KN.max()
+    assert any("though it names kN" in note for note in case.notes)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import hdcal
-from hdcal.data.turning_rows import sense_at_turns
 
 UP = np.linspace(0.0, 40.0, 31)
 WAY = np.concatenate([UP, UP[-2::-1]])
@@ -30,15 +29,6 @@ def test_without_a_loop_the_turning_row_counts_as_loading():
     for seed in range(50):
         case = hdcal.read_case(_readings(True, friction=0.0, seed=seed))
         assert case.records.sense[TOP] == 1.0
-
-
-def test_each_turn_of_alternating_runs_is_decided_by_itself():
-    runs = [_readings(True), _readings(False, seed=2)]
-    force, run = np.empty(2 * WAY.size), np.tile([0, 1], WAY.size)
-    force[0::2], force[1::2] = (each["force_N"] for each in runs)
-    moved = np.tile(np.where(np.arange(WAY.size) <= TOP, 1.0, -1.0), (2, 1)).T.ravel()
-    found = sense_at_turns(moved, np.repeat(WAY, 2), force, run)
-    assert np.flatnonzero(found != moved).tolist() == [2 * TOP + 1]
 
 
 def test_a_reading_that_repeats_the_top_is_on_the_branch_of_its_force():

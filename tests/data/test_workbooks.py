@@ -10,6 +10,8 @@ from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 
 READINGS = [(0.1 * row, 0.02 * row + 0.0005) for row in range(7)]
+DEFORMATION, FORCE = np.array(READINGS).T * [[1.0], [1000.0]]
+HEAD = [("Weg", "Kraft"), ("mm", "kN")]
 
 
 def book(folder, **sheets):
@@ -25,168 +27,90 @@ def book(folder, **sheets):
     return path
 
 
-def read(path, folder, **asked):
-    return read_case(path, folder / "gear.toml", **asked)
-
-
-def test_a_testing_machines_workbook(folder):
+def test_a_testing_machines_workbook(tmp_path):
     """Parameters on one sheet; the curve on another, below a title, beside a gap."""
     curve = [
         ("Prüfling", 3),
         (None, None, None),
-        (None, "Weg", "Kraft"),
-        (None, "mm", "kN"),
-        *((None, *row) for row in READINGS),
+        *((None, *row) for row in [*HEAD, *READINGS]),
     ]
     parameters = [("Norm", "EN 10002"), ("Geschwindigkeit", 1.5)]
-    path = book(folder, Parameter=parameters, Kurve=curve)
-    case = read(path, folder)
-    deformation, force = np.array(READINGS).T
+    case = read_case(book(tmp_path, Parameter=parameters, Kurve=curve))
     # A workbook holds sixteen digits.
-    np.testing.assert_allclose(case.records.deformation, deformation, rtol=1e-14)
-    np.testing.assert_allclose(case.records.force, 1000.0 * force)
-    assert "sheet 'Kurve' is meant" in case.notes[0]
+    np.testing.assert_allclose(case.records.deformation, DEFORMATION, rtol=1e-14)
+    np.testing.assert_allclose(case.records.force, FORCE)
+    assert "sheet 'Kurve' is read" in case.notes[0]
     assert all(note.startswith("ASSUMED") for note in case.notes[:4])
 
 
 def test_of_two_tables_one_has_to_be_named(folder):
-    head = ("deformation_mm", "force_kN")
     other = [(x, 2.0 * f) for x, f in READINGS]
-    path = book(folder, first=[head, *READINGS], second=[head, *other])
-    with pytest.raises(InputError, match="2 sheets hold a table: 'first', 'second'"):
-        read(path, folder)
-    case = read(path, folder, sheet="second")
-    assert case.records.force[-1] == pytest.approx(2000.0 * READINGS[-1][1])
-    with pytest.raises(InputError, match="no `sheet` 'third'"):
-        read(path, folder, sheet="third")
-
-
-def test_the_ending_of_its_name_does_not_matter(folder):
-    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
-    path.replace(folder / "data.csv")
-    assert len(read_case(folder).records.force) == len(READINGS)
-
-
-def test_what_another_kind_of_file_has_is_not_passed_over(folder):
-    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
-    with pytest.raises(InputError, match="no `encoding`"):
-        read(path, folder, encoding="cp1252")
+    path = book(folder, first=[*HEAD, *READINGS], second=[*HEAD, *other])
+    for asked, words in (
+        ({}, "2 sheets hold a table: 'first', 'second'"),
+        ({"sheet": "third"}, "no `sheet` 'third'"),
+        ({"encoding": "cp1252"}, "no `encoding`"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_case(path, **asked)
     with pytest.raises(InputError, match="no `sheet`"):
-        read_case(folder, sheet="only")
+        read_case(folder, sheet="first")
+    np.testing.assert_allclose(read_case(path, sheet="second").records.force, 2 * FORCE)
 
 
-def test_a_workbook_without_readings_is_refused(folder):
-    path = book(folder, notes=[("nothing", "here")])
+def test_what_is_no_workbook_of_readings_is_refused(tmp_path):
     with pytest.raises(InputError, match="no sheet holds a table"):
-        read(path, folder)
-
-
-def test_an_archive_of_something_else_is_refused(folder):
-    path = folder / "other.xlsx"
+        read_case(book(tmp_path, notes=[("nothing", "here")]))
+    path = tmp_path / "other.xlsx"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("readme.txt", "no workbook")
     with pytest.raises(InputError, match="no workbook that can be read"):
-        read(path, folder)
-
-
-def test_what_unpacks_to_too_much_is_refused_before_it_is_read(folder):
-    path = folder / "bomb.xlsx"
+        read_case(path)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for part in range(5):
             archive.writestr(f"xl/{part}.xml", b"0" * (1 << 26))
     with pytest.raises(InputError, match="more than 256 MiB"):
-        read(path, folder)
+        read_case(path)
 
 
-HEAD = [("Weg", "Kraft"), ("mm", "kN")]
-
-
-def test_sheets_of_one_kind_are_specimens(folder):
-    """The second holds its numbers as texts with commas, below a title."""
-    other = [(f"{x:.3f}".replace(".", ","), f"{2 * f:.4f}") for x, f in READINGS]
+def test_sheets_of_one_kind_are_specimens(tmp_path):
+    """The second holds its numbers as texts with commas, in another unit."""
+    other = [(f"{x:.3f}".replace(".", ","), f"{2e3 * f:.1f}") for x, f in READINGS]
     other = [(x, f.replace(".", ",")) for x, f in other]
     sheets = {
         "Protokoll": [("Prüfer", "M. Weber")],
         "Probe 1": [*HEAD, *READINGS],
-        "Probe 2": [("Probe 2",), (), *HEAD, *other],
+        "Probe 2": [("Probe 2",), (), HEAD[0], ("mm", "N"), *other],
+        "Probe 3": [*HEAD, *READINGS[:4]],
     }
-    path = book(folder, **sheets)
+    path = book(tmp_path, **sheets)
     with pytest.raises(InputError, match=r"with a \*, as in 'Probe\*'"):
-        read(path, folder)
-    case = read(path, folder, sheet="Probe*")
-    deformation, force = np.array(READINGS).T
-    np.testing.assert_allclose(case.records.deformation, np.tile(deformation, 2))
-    wanted = np.append(1000.0 * force, 2000.0 * force)
-    np.testing.assert_allclose(case.records.force, wanted, atol=0.051)
+        read_case(path)
+    case = read_case(path, sheet="Probe*")
+    np.testing.assert_allclose(case.records.deformation, np.tile(DEFORMATION, 2))
+    np.testing.assert_allclose(
+        case.records.force, np.append(FORCE, 2 * FORCE), atol=0.051
+    )
     assert case.specimen_labels == ("Probe 1", "Probe 2")
     assert np.array_equal(case.records.specimen, np.repeat([0, 1], len(READINGS)))
-    assert any("each sheet is a specimen" in note for note in case.notes)
+    assert any("left out, as too few readings: 'Probe 3'" in n for n in case.notes)
     assert case.name == "book-Probe"
 
 
-def test_of_joined_sheets_a_finding_names_sheet_and_row(folder):
-    spoiled = [*READINGS[:3], (0.3, "broken"), *READINGS[4:]]
-    titled = [("Probe 2",), (), *HEAD, *spoiled]
-    path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": titled})
-    with pytest.raises(InputError, match=r"sheet 'Probe 2', row 8.*broken"):
-        read(path, folder, sheet="Probe*")
+def test_a_finding_names_sheet_and_row(tmp_path):
+    """Beside 0.5 a text of "1,234" may be a thousand: that is refused, not decided."""
+    for cell in ("broken", "1,234"):
+        spoiled = [*READINGS[:3], (0.3, cell), *READINGS[4:]]
+        titled = [("Probe 2",), (), *HEAD, *spoiled]
+        path = book(tmp_path, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": titled})
+        with pytest.raises(InputError, match=rf"sheet 'Probe 2', row 8.*{cell}"):
+            read_case(path, sheet="Probe*")
 
 
-def test_sheets_of_other_columns_are_not_joined(folder):
-    other = [("Weg", "Kraft"), ("mm", "N"), *READINGS]
-    path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": other})
-    with pytest.raises(InputError, match="'Probe 1' and 'Probe 2' have other columns"):
-        read(path, folder, sheet="Probe*")
-
-
-def test_only_a_sheet_of_commas_alone_gets_points(folder):
-    """Beside 0.5 a text of "1,234" may be a thousand: that is told, not decided."""
-    head = [("deformation_mm", "force_N")]
-    mixed = [(x, f"1,{234 + row}") for row, (x, _) in enumerate(READINGS)]
-    path = book(folder, **{"Probe 1": [*head, *READINGS], "Probe 2": [*head, *mixed]})
-    with pytest.raises(InputError, match="1,234"):
-        read(path, folder, sheet="Probe*")
-
-
-def test_a_sheet_of_few_readings_is_said_to_be_left_out(folder):
-    sheets = {"P 1": [*HEAD, *READINGS], "P 2": [*HEAD, *READINGS[:4]]}
-    case = read(book(folder, **sheets), folder, sheet="P*")
-    assert any("left out, as too few readings: 'P 2'" in note for note in case.notes)
-
-
-def test_labels_of_joined_sheets_keep_their_commas(folder):
-    head = [("deformation_mm", "force_N", "run")]
-    points = [(x, f, "1,2") for x, f in READINGS]
-    commas = [(*(str(v).replace(".", ",") for v in pair), "1,2") for pair in READINGS]
-    sheets = {"P 1": [*head, *points], "P 2": [*head, *commas]}
-    case = read(book(folder, **sheets), folder, sheet="P*")
-    assert case.run_labels == ("P 1/1,2", "P 2/1,2")
-
-
-def test_headers_again_begin_another_run_in_joined_sheets_too(folder):
-    twice = [*HEAD[:1], *READINGS, *HEAD[:1], *READINGS]
-    alone = [("deformation_mm", "force_N") if r == HEAD[0] else r for r in twice]
-    path = book(folder, **{"P 1": alone, "P 2": alone})
-    exact = read(path, folder, sheet="P 1")
-    assert len(exact.run_labels) == 2
-    joined = read(path, folder, sheet="P*")
-    assert len(joined.records.force) == 4 * len(READINGS)
-    assert len(joined.specimen_labels) == 2
-
-
-def test_a_sheet_that_names_specimens_itself_is_not_joined(folder):
-    rows = [("deformation_mm", "force_N", "specimen"), *((*r, "a") for r in READINGS)]
-    path = book(folder, **{"P 1": rows, "P 2": rows})
-    with pytest.raises(InputError, match="'P 1' names specimens itself"):
-        read(path, folder, sheet="P*")
-
-
-def test_texts_with_commas_beside_numbers_are_decimal_where_they_can_be_no_other(
-    folder,
-):
-    """As test machines' exports hold them after somebody typed a value again."""
+def test_texts_with_commas_beside_numbers_are_decimal(tmp_path):
+    """As exports hold them after somebody typed a value again."""
     typed = [(f"{x:.4f}".replace(".", ","), f) for x, f in READINGS[:3]]
-    path = book(folder, **{"Probe 1": [*HEAD, *typed, *READINGS[3:]]})
+    path = book(tmp_path, **{"Probe 1": [*HEAD, *typed, *READINGS[3:]]})
     for sheet in ("Probe 1", "Probe*", None):
-        case = read(path, folder, sheet=sheet)
-        np.testing.assert_allclose(case.records.deformation, np.array(READINGS)[:, 0])
+        case = read_case(path, sheet=sheet)
+        np.testing.assert_allclose(case.records.deformation, DEFORMATION)

@@ -147,7 +147,9 @@ def test_what_is_no_case_or_model_is_told_so(results):
     case = results["Case"][0]
     frame = case.to_frame()
     for asked in (hdcal.calibrate, hdcal.diagnose, hdcal.fit, hdcal.calibrate_dynamic):
-        with pytest.raises(InputError, match=r"a DataFrame is none\. Read it first"):
+        with pytest.raises(
+            InputError, match=r"a DataFrame, not a Case\. Read it first"
+        ):
             asked(frame)
     with pytest.raises(InputError, match="Case is no calibrated model"):
         hdcal.margin(case, 0.4)

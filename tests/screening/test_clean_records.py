@@ -28,6 +28,6 @@ def test_simulated_clean_records_are_clean(kind, noise):
     alarms = 0
     for seed in range(6):
         record = clean_record(np.random.default_rng([seed, 1]), kind, noise)
-        found = screen(record.deformation, record.force, record.time, record.run)
+        found = screen(record.deformation, record.force, record.run)
         alarms += bool(found.observations)
     assert alarms <= 1

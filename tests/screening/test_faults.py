@@ -88,10 +88,19 @@ def test_noise_about_one_level_has_no_jump(rows):
     x = np.linspace(0.0, 1.0, rows)
     kinds = {
         one.kind
-        for _ in range(300)
+        for _ in range(80)
         for one in screen(x, rng.normal(0.0, 1.0, rows)).observations
     }
     assert not [kind for kind in kinds if "jump" in kind]
+
+
+def test_the_knee_of_a_preload_is_no_jump():
+    """An extension spring with slack, whose coils open at 30 N within two rows."""
+    x = np.arange(120) / 3.0
+    y = np.interp(x, [0.0, 1.2, 1.7, 40.0], [0.0, 0.0, 30.0, 30.0 + 2.1 * 38.3])
+    found = screen(x, y + RNG.normal(0.0, 0.03, x.size))
+    assert not found.observations
+    assert found.straight.slope == pytest.approx(2.1, rel=0.01)
 
 
 def contact_cycles(seed=0, friction=0.0, play=0.0):
@@ -141,13 +150,6 @@ def test_several_wild_readings_do_not_hide_each_other():
     assert one.rows == ((40, 42), (52, 52), (100, 100), (150, 151))
 
 
-def test_a_wild_reading_of_the_deformation_is_cut():
-    x, y = ramp()
-    x[77] = 9.9
-    one = only(screen(x, y))
-    assert (one.kind, one.rows) == ("wild reading", ((77, 77),))
-
-
 def test_the_record_ends_where_the_part_breaks():
     x, y = ramp()
     y[140:] = np.linspace(4.0, 3.0, 60)
@@ -162,21 +164,6 @@ def test_a_negative_slope_in_places_is_asked_about():
     x = np.linspace(0.0, 1.0, 100)
     one = only(screen(x, -STIFFNESS * x + 12.0 * np.sin(25.0 * x)))
     assert (one.kind, one.action) == ("negative slope", "asked")
-
-
-def test_a_clock_that_wraps_is_counted_on():
-    x, y = ramp()
-    time = np.r_[np.arange(100.0, 200.0), np.arange(100.0)]
-    found = screen(x, y, time)
-    assert only(found).action == "new zero"
-    np.testing.assert_allclose(np.diff(found.time), 1.0)
-
-
-def test_a_clock_reset_with_a_new_test_is_asked_about():
-    x, y = ramp(100)
-    time = np.tile(np.arange(100.0), 2)
-    found = screen(np.tile(x, 2), np.tile(y, 2), time)
-    assert [one.kind for one in found.asked] == ["clock"]
 
 
 def test_a_saturated_force_is_cut():
@@ -300,11 +287,3 @@ def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
     x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
     found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
     assert not [one for one in found.observations if "jump" in one.kind]
-
-
-def test_two_rows_are_no_straight_part():
-    x, y = ramp()
-    x, y = x[::20], y[::20]
-    y[-2:] = 20.0 * y.max(), -20.0 * y.max()
-    found = screen(x, y)
-    assert found.straight is None or found.straight.rows.sum() >= 5

@@ -17,7 +17,6 @@ from hdcal.screening.result import Screening
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
 
 
@@ -45,10 +44,10 @@ class Gear:
             in the same way.
         effect_priors: what the gear file says of them only, keyed `effect.parameter`;
             the names are not checked here, the effects live on a higher floor.
-        dynamic_priors: of the moving gear, merged in the same way; `mass` is among
+        dynamic_priors: priors of a moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.
-        density: of the material [N·s²/mm⁴], None where its file states none.
-        gauge_priors: of the gauges' gains and the thermometer's offset, those that a
+        density: density of the material [N·s²/mm⁴], None where its file states none.
+        gauge_priors: priors of the gauges' gains and the thermometer's offset that a
             certificate states: keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
     """
@@ -90,14 +89,14 @@ class Case:
         name: stem of the file, or name of the folder.
         gear: the gear and its priors.
         records: the rows.
-        run_labels: of each run index.
-        specimen_labels: of each specimen index.
+        run_labels: label of each run index.
+        specimen_labels: label of each specimen index.
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
-        lots: of each specimen index; empty where none is stated, as the next three.
-        operators: of each run index.
-        rigs: of each run index.
+        lots: lot of each specimen index; empty where none is stated, as the next three.
+        operators: operator of each run index.
+        rigs: rig of each run index.
         dates: first one of each run index in ISO 8601, empty for a run without one.
         left_out: specimens left out because of a faulty row, each with the finding;
             empty unless `skip_bad` was given.
@@ -105,8 +104,8 @@ class Case:
             way, or for a working range: ends of each stretch [mm].
         excluded_sense: sign of the movement whose readings were left out, where one
             branch alone was chosen; 0 where none was.
-        screening: of the whole record before rows were cut; None where the rows are
-            not those of a file.
+        screening: result for the whole record before rows were cut; None where the
+            rows are not those of a file.
         units: names and units of force and deformation; of a torsional spring they
             are a torque [N·m] and an angle [rad].
     """
@@ -157,12 +156,6 @@ class Case:
             columns[name] = np.array(labels[name])[np.asarray(getattr(records, name))]
         return pd.DataFrame(columns)
 
-    def to_datatree(self) -> "xr.DataTree":
-        """Return the readings as xarray's DataTree, over the dimension `row`."""
-        import xarray as xr
-
-        return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
-
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the readings.
 
@@ -179,16 +172,14 @@ class Case:
 def require_force(case: Case, question: str) -> None:
     """Raise InputError where torques and angles were measured."""
     if not case.units.is_force:
-        words = (
-            f"torques over angles are no readings for {question}, which is of forces"
-        )
-        remedy = "Ask check, calibrate, diagnose, predict, margin, fleet or compare"
+        words = f"{question} needs forces, and the readings are torques over angles"
+        remedy = "Use check, calibrate, diagnose, predict, margin, fleet or compare"
         raise InputError([Finding(case.name, words, remedy)])
 
 
 def require_case(given: object) -> None:
     """Raise InputError unless a case was given."""
     if not isinstance(given, Case):
-        words = f"a {type(given).__name__} is none"
+        words = f"is a {type(given).__name__}, not a Case"
         remedy = "Read it first, as in read_case(data, gear={'radius_mm': 40.0, …})"
         raise InputError([Finding("case", words, remedy)])

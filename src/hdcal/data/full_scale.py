@@ -53,13 +53,7 @@ _FAR = 10.0
 
 
 def scale_of(force: np.ndarray, deformation: np.ndarray, reading: str) -> FullScale:
-    """Return the largest readings; one in a hundred may be wild.
-
-    Args:
-        force: shape (n,) [N].
-        deformation: as read, shape (n,) [mm].
-        reading: of the deformation, `radial` or `diametral`.
-    """
+    """Return the largest readings; one in a hundred may be wild."""
     radial = deformation * (0.5 if reading == "diametral" else 1.0)
     (largest, width, level), (far, stroke, centre) = map(_reach, (force, radial))
     # Where nothing was read but zeros, nothing is known of the scale.

@@ -56,7 +56,6 @@ def unsized() -> Gear:
 def read_gear(
     source: Path | str | Mapping[str, Any],
     theory: str | None = None,
-    material: Path | None = None,
     reading: str | None = None,
 ) -> Gear:
     """Read a gear file, or its content as a mapping, and merge its priors.
@@ -73,8 +72,7 @@ def read_gear(
         source: the TOML file; or its tables as a mapping, where the names of the tables
             may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
-        material: stands for the material file that the gear names, wherever that is.
-        reading: of the deformation, `radial` or `diametral`, where the file is silent.
+        reading: `radial` or `diametral`, where the file does not state it.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -91,7 +89,7 @@ def read_gear(
             remedy = did_you_mean(theory, list(get_args(Theory)))
             wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
         chosen: Any = theory or _in_table(toml, "gear").get("theory")
-        facts = wrong.attempt(_material, toml, path.parent, material, chosen)
+        facts = wrong.attempt(_material, toml, path.parent, chosen)
         given = wrong.attempt(_given_priors, toml, theory)
     assert isinstance(model, GearFile) and facts is not None and given is not None
     return _assemble(model, chosen or "ring", facts, given, path, toml)
@@ -174,23 +172,19 @@ def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
     return table if isinstance(table, dict) else {}
 
 
-def _material(
-    toml: TomlFile, folder: Path, given: Path | None, theory: str | None
-) -> dict[str, Prior]:
+def _material(toml: TomlFile, folder: Path, theory: str | None) -> dict[str, Prior]:
     """Return priors and facts of the material, with the modulus of a spring."""
     if theory != SPRING:
-        return _named_material(toml, folder, given)
+        return _named_material(toml, folder)
     shipped = rig_priors()
     own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
     if "material" not in _in_table(toml, "gear"):
         return own | {"alpha": shipped["spring_alpha"]}
-    return _named_material(toml, folder, given) | own
+    return _named_material(toml, folder) | own
 
 
-def _named_material(
-    toml: TomlFile, folder: Path, given: Path | None
-) -> dict[str, Prior]:
-    """Return priors and facts of the material that the file names, or a given one."""
+def _named_material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
+    """Return priors and facts of the material that the file names."""
     name = _in_table(toml, "gear").get("material", _MATERIAL)
     if not isinstance(name, str) or not 0 < len(name) <= 1000:
         return {}  # reported with the other types
@@ -204,7 +198,7 @@ def _named_material(
         known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
         remedy = f"{hint}{known}; for another one give the path of a .toml file"
         raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
-    return read_material(given or folder / name, name)
+    return read_material(folder / name, name)
 
 
 def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:

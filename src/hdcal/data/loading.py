@@ -34,7 +34,7 @@ class Motion:
         sense: sign of the last movement, before any that of the first one,
             +1 in a run that never moves; shape (n,).
         rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
-        features: of `unloading`, `holds`, `rates`, `cycles` those present, and
+        features: those present among `unloading`, `holds`, `rates`, `cycles`, and
             `holds or rates` where one of the two is.
         resets: rows reached by one step back over most of the range.
     """
@@ -59,9 +59,6 @@ class _Move:
 def loading_side(deformation: np.ndarray) -> int:
     """Tell on which side of the undeformed gear it was tested.
 
-    Args:
-        deformation: as read [mm], shape (n,).
-
     Returns:
         +1 where it was pressed, -1 where it was pulled, 0 where both count: the
         smaller reaches a share of the larger that counts as a movement.
@@ -75,10 +72,6 @@ def loading_side(deformation: np.ndarray) -> int:
 def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
     """Tell loading, away from the undeformed gear, from unloading.
 
-    Args:
-        deformation: as read [mm], shape (n,).
-        movement: +1 it increased, 0 it was held, -1 it decreased, shape (n,).
-
     Returns:
         +1 loading, 0 holding, -1 unloading, in compression and in tension, shape (n,).
     """
@@ -89,12 +82,7 @@ def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
 def movement_words(
     deformation: np.ndarray, name: str = "deformation"
 ) -> dict[int, str]:
-    """Return the names of increasing (+1) and decreasing (-1) deformation.
-
-    Args:
-        deformation: of all rows, as read [mm], shape (n,).
-        name: of the deformation.
-    """
+    """Return the names of increasing (+1) and decreasing (-1) deformation."""
     side = loading_side(deformation)
     if side == 0:
         return {1: f"increasing {name}", -1: f"decreasing {name}"}

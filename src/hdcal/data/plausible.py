@@ -15,7 +15,7 @@ class Range(NamedTuple):
     Attributes:
         low: smallest value.
         high: largest value.
-        unit: of both; empty for counts and shares.
+        unit: unit of both; empty for counts and shares.
         why: what the ends stand for.
         inner: whether the ends themselves are out.
         written: factor to the unit in which people write it, and that unit, where it
@@ -148,13 +148,7 @@ def range_of(name: str) -> Range:
 
 
 def implausible(name: str, given: Any, quantity: str = "") -> list[Finding]:
-    """Return a finding where a number, or one of several, is beyond its range.
-
-    Args:
-        name: of the parameter.
-        given: the number or numbers; None for none.
-        quantity: that it is, where the parameter's name does not say so.
-    """
+    """Return a finding where a number, or one of several, is beyond its range."""
     return out_of_range(name, given, range_of(quantity or name))
 
 

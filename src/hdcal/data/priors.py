@@ -104,11 +104,6 @@ def read_priors(
 ) -> dict[str, Prior]:
     """Read a prior file whose top-level tables are parameters.
 
-    Args:
-        source: the file.
-        units: name -> code unit of every parameter it may hold.
-        file: its name in findings; that of the source when empty.
-
     Raises:
         InputError: holds everything that is wrong with the file.
     """

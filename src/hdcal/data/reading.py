@@ -10,6 +10,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.gear import read_gear, unsized
 from hdcal.data.measurements.case_of import case_of
 from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME, file_of_gear
+from hdcal.data.measurements.joining import read_sheets
 from hdcal.data.measurements.measurements import of_specimen, read_measurements
 from hdcal.data.measurements.notes import ASSUMED
 from hdcal.data.measurements.screened import asked_range
@@ -19,12 +20,12 @@ from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
-_NEARBY = f"the gear file is the {GEAR_NAME} beside the data"
+_NEARBY = f"the gear file is the {GEAR_NAME} next to the data"
 # The note where no gear file was named, and none lies beside the data.
 UNSIZED = (
-    f"{ASSUMED}the part is a spring of which nothing is known but these readings: its "
-    "stiffness is asked, no K. K needs sizes, stated in a gear file, named or as "
-    f"{GEAR_NAME} beside the data"
+    f"{ASSUMED}without a gear file the part is a spring: the result is its stiffness, "
+    "and no K. K needs the sizes in a gear file, which is named or is the file "
+    f"{GEAR_NAME} next to the data"
 )
 
 
@@ -34,7 +35,6 @@ def read_case(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    material: Path | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     reading: str | None = None,
@@ -56,16 +56,15 @@ def read_case(
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
         theory: overrides the gear file's theory.
-        material: stands for the material file that the gear names.
-        encoding: of the CSV file; by default the likeliest.
-        sheet: of a workbook (.xlsx); by default the one with readings. With an
+        encoding: encoding of a CSV file; by default the likeliest.
+        sheet: sheet of a workbook (.xlsx); by default the one with readings. With an
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
-        reading: of the deformation, `radial` or `diametral`, where the gear file is
+        reading: `radial` or `diametral` deformation, where the gear file is
             silent; by default it is taken for radial, and a note says so.
         specimen: label of the one whose rows are wanted; by default all of them.
         skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
-        range: working range, outside of which rows are left out: `0.1:0.6` of the
+        range: working range; rows outside it are left out: `0.1:0.6` of the
             deformation as read [mm], `10%:40%` of the largest force of each run, or
             `straight` for the longest straight part; by default that of the gear file,
             or `all` that was read until the force drops for good.
@@ -85,14 +84,16 @@ def read_case(
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
-        asked = (theory, material, reading)
-        described = of_gear.attempt(gear_of, gear, nearby, folder, asked)
+        how_read = (theory, reading)
+        described = of_gear.attempt(gear_of, gear, nearby, folder, how_read)
         known = None if described is None else described[0]
         named = columns if known is None else known.source.get("columns", {}) | columns
-        how: dict = {"gear": known, "skip_bad": skip_bad}
-        measured = wrong.attempt(
-            read_measurements, table, named, encoding, sheet, **how
-        )
+        if sheet is not None and "*" in sheet:
+            asked = (table, named, sheet, known, skip_bad)
+            measured = wrong.attempt(read_sheets, *asked)
+        else:
+            how: dict = {"sheet": sheet, "gear": known, "skip_bad": skip_bad}
+            measured = wrong.attempt(read_measurements, table, named, encoding, **how)
         wrong += of_gear
         alone = own != path and measured is not None and len(measured.gears[1]) == 1
         if measured is not None and specimen is not None and not alone:
@@ -109,7 +110,7 @@ def asked_columns(
     """Return columns as texts, and whether the data are a table in memory."""
     if columns is not None and not isinstance(columns, Mapping):
         remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
-        raise InputError([Finding("columns", "is no mapping", remedy)])
+        raise InputError([Finding("columns", "is not a mapping", remedy)])
     if not is_frame(data) and not isinstance(data, str | os.PathLike):
         remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
         raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
@@ -128,26 +129,23 @@ def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     nearby: Path | None,
     folder: bool,
-    asked: tuple[str | None, Path | None, str | None],
+    asked: tuple[str | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and notes on its source.
 
-    Args:
-        gear: that was named, as in `read_case`.
-        nearby: place of a gear file that may be there; None of a table in memory.
-        folder: whether one has to be there.
-        asked: theory, material and reading, as in `read_case`.
+    A gear file may be at the place `nearby`, and must be there in a folder. What is
+    asked are theory and reading, as in `read_case`.
     """
-    theory, material, reading = asked
-    notes = [f"the deformation is {reading}, as was asked"] if reading else []
+    theory, reading = asked
+    notes = [f"the deformation is {reading}, as requested"] if reading else []
     if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
         gear = nearby
         notes += [] if folder else [_NEARBY]
     if gear is not None:
         known = read_gear(gear, *asked)
         return known, (*_defaults(known), *notes)
-    if theory not in (None, SPRING) or material is not None or reading is not None:
-        words = "no gear file says the sizes that this needs"
+    if theory not in (None, SPRING) or reading is not None:
+        words = "this needs sizes, and there is no gear file"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
     return unsized(), (UNSIZED,)
 
@@ -163,10 +161,10 @@ def _defaults(gear: Gear) -> Iterator[str]:
     if leaves_reading_open(gear):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
-            "twice as large, the gear file has to say so"
+            "twice as large, state that in the gear file"
         )
     if gear.theory != SPRING and "material" not in gear.source.get("gear", {}):
         yield (
             f"{ASSUMED}the gear is of steel. If not, which changes K and the influence "
-            "of the temperature, the gear file has to name its material"
+            "of the temperature, name its material in the gear file"
         )

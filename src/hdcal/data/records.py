@@ -97,11 +97,6 @@ def lies_far(records: Records) -> bool:
 
 
 def less_run_means(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Return values less the mean of their run, shape (n,).
-
-    Args:
-        values: shape (n,).
-        run: index of the run of each, shape (n,).
-    """
+    """Return values less the mean of their run, shape (n,)."""
     count = np.maximum(np.bincount(run), 1)
     return values - (np.bincount(run, values) / count)[run]

@@ -10,10 +10,6 @@ def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
     """Return problem and remedy where a file is no finite one, or too large.
 
     A file that is missing or may not be looked at is left to who opens it.
-
-    Args:
-        path: of the file; links are followed.
-        largest: size that is still read [bytes].
     """
     try:
         status = path.stat()

@@ -27,14 +27,14 @@ def require_scatter(case: Case) -> None:
     if np.max(np.abs(left_of_lines(records, force))) > _NOTHING * np.max(np.abs(force)):
         return
     words = (
-        f"the {case.units.load}s lie on a straight line to the last digit, so that "
-        "nothing tells how far readings scatter"
+        f"the {case.units.load}s lie on a straight line to the last digit, so "
+        "their scatter cannot be estimated"
     )
     members = len(np.unique(records.run)) + len(case.specimen_labels)
     if len(force) <= members:
         words = (
-            "no reading is left over that tells how far readings scatter: each run has "
-            "as few as its line and its zero need"
+            "the scatter of the readings cannot be estimated: each run has no more "
+            "readings than its line and its zero need"
         )
     remedy = "To readings that were computed, add noise"
     if case.units.is_force:

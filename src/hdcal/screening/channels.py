@@ -1,4 +1,4 @@
-"""Single channels: a clock that is reset, saturation, a gauge that trembles."""
+"""Single channels: saturation, and a gauge that trembles."""
 
 from typing import Any
 
@@ -6,41 +6,6 @@ import numpy as np
 from scipy.stats import norm, wilcoxon
 
 from hdcal.screening.turning_points import turning_points
-
-# More steps back than this are no resets but rows that are out of order.
-_MOST_RESETS = 3
-
-
-def steps_back(time: np.ndarray) -> np.ndarray:
-    """Return the rows at which time is before that of the row before.
-
-    Args:
-        time: as read [s], shape (n,).
-    """
-    return np.flatnonzero(np.diff(time) < 0.0) + 1
-
-
-def out_of_order(rows: np.ndarray) -> bool:
-    """Tell whether so many steps back are no resets.
-
-    Args:
-        rows: of `steps_back`.
-    """
-    return rows.size > _MOST_RESETS
-
-
-def counted_on(time: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the time counted on at each reset, by the usual step.
-
-    Args:
-        time: as read [s], shape (n,).
-        rows: of `steps_back`.
-    """
-    steps = np.diff(time)
-    usual = float(np.median(steps[steps >= 0.0])) if np.any(steps >= 0.0) else 0.0
-    steps[rows - 1] = usual
-    return time[0] + np.r_[0.0, np.cumsum(steps)]
-
 
 # Digits are finer than this share of the range, or a value repeats by itself.
 _DIGITS = 2e-3
@@ -111,10 +76,6 @@ def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
     A movement that is really uneven has the force follow it; scatter of the gauge
     does not. Of the second differences the part that the force does not follow is
     the gauge's.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
     """
     if x.size < _FEWEST_ROWS:
         return 0.0
@@ -141,12 +102,7 @@ def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def matters(scatter: float, x: np.ndarray) -> bool:
-    """Tell whether scatter makes a straight line too flat.
-
-    Args:
-        scatter: sd of the deformation's reading.
-        x: deformation, shape (n,).
-    """
+    """Tell whether scatter makes a straight line too flat."""
     return scatter**2 > _MATTERS * float(np.var(x))
 
 

@@ -47,10 +47,6 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
 
     Before a tare nothing moves; then the force steps to another level while the
     deformation stays, or the deformation while the force stays.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
     """
     last = int(_EARLY * x.size)
     if last < 2:
@@ -86,12 +82,7 @@ def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
-    """Return the first row after the largest force has dropped for good, and the drop.
-
-    Args:
-        x: deformation, growing with the load in the mean, shape (n,).
-        y: force, likewise.
-    """
+    """Return the first row after the force has dropped for good, and the drop."""
     start = float(np.median(x[:3]))
     way = 1.0 if x.max() - start >= start - x.min() else -1.0
     x, y = way * (x - start), way * y

@@ -3,17 +3,13 @@
 import numpy as np
 
 from hdcal.screening.channels import (
-    counted_on,
     matters,
-    out_of_order,
     saturated_rows,
     scatter_of_deformation,
-    steps_back,
 )
 from hdcal.screening.ends import rows_before_tare
 from hdcal.screening.jumps import Jump, find_jump
 from hdcal.screening.result import (
-    DROPPED,
     REPEATED,
     SATURATED,
     TARE,
@@ -27,8 +23,6 @@ from hdcal.screening.wild import FEWEST, wild_readings
 _MOST_JUMPS = 4
 # A larger share of wild readings is noise with heavy tails.
 _MOST_WILD = 0.1
-# Fewer rows after a reset of the clock are no new test, but its end.
-_FEWEST_AFTER = 5
 # Share of the range within which nothing moves.
 _REST = 0.02
 # Share of the readings that stand in the usual number of rows, or in one more or less,
@@ -43,8 +37,6 @@ _JUMPS: dict[str, tuple[Kind, str]] = {
 
 def look_at(one: Run) -> None:
     """Find what is wrong with the readings of a run."""
-    if one.time is not None:
-        _clock(one)
     _repeats(one)
     if one.plain or one.x.size < FEWEST or not np.ptp(one.x) or not np.ptp(one.y):
         return
@@ -60,29 +52,6 @@ def look_at(one: Run) -> None:
         one.scatter = 0.0
     else:
         one.observe("scatter of the deformation", rows, one.scatter, "mm", "smoothed")
-
-
-def _clock(one: Run) -> None:
-    """Count the time on where the clock was reset while the test went on."""
-    assert one.time is not None
-    back = steps_back(one.time)
-    if not back.size:
-        return
-    size = float(np.min(np.diff(one.time)))
-    steps = np.abs(np.diff(one.x))
-    usual = max(4.0 * float(np.median(steps)), 0.02 * float(np.ptp(one.x)))
-    new_test = np.any(steps[back - 1] > usual)
-    if back[0] > one.x.size - _FEWEST_AFTER and back[0] > FEWEST:
-        after = np.arange(back[0], one.x.size)
-        one.cut(after, DROPPED)
-        one.observe("clock", after, size, "s", "cut")
-        one.time[after] = one.time[back[0] - 1]
-        return
-    if out_of_order(back) or new_test:
-        one.observe("clock", back, size, "s", "asked")
-        return
-    one.time = counted_on(one.time, back)
-    one.observe("clock", back, size, "s", "new zero")
 
 
 def _repeats(one: Run) -> None:
@@ -151,12 +120,6 @@ def _jumps(one: Run) -> bool:
         if jump is None:
             break
         row = int(rows[jump.row])
-        if _rested(one, row):
-            before = np.flatnonzero(one.kept[:row])
-            one.cut(before, TARE)
-            size, _, unit = _size(jump)
-            one.observe("before the tare", before, size, unit, "cut")
-            continue
         one.x[row:] -= jump.deformation
         one.y[row:] -= jump.force
         # what is left of one that was found before
@@ -174,9 +137,3 @@ def _jumps(one: Run) -> bool:
 def _size(jump: Jump) -> tuple[float, Kind, str]:
     kind, unit = _JUMPS[jump.channel]
     return jump.deformation if unit == "mm" else jump.force, kind, unit
-
-
-def _rested(one: Run, row: int) -> bool:
-    """Tell whether nothing moved before a row."""
-    before = np.ptp(one.x[:row][one.kept[:row]])
-    return bool(before < _REST * np.ptp(one.x[row:][one.kept[row:]]))

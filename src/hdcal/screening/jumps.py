@@ -4,14 +4,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.screening.local_fit import REACH, looked_at, resolution, spread
-from hdcal.screening.possible_jumps import LEAST, SIDE, off_sequence, possible_jumps
+from hdcal.screening.local_fit import (
+    REACH,
+    Usual,
+    looked_at,
+    median,
+    resolution,
+    spread,
+    windows,
+)
 from hdcal.screening.turning_points import noise_sd, turning_points
 
+# Rows needed on each side of a jump; from fewer it could be anything.
+SIDE = 4
+# A smaller jump, as a share of the tested range, is left to the model's noise.
+LEAST = 0.02
+# A window moves one way when this share of its way is progress, and rests when it
+# covers less than the second share of what windows usually do.
+_PROGRESS, _RESTS = 0.6, 0.25
+# Any other step about a jump is at most this share of it.
+_OTHERS = 0.5
+_NEAR = np.r_[1 - REACH : 0, 1:REACH]
 # Places that are tried.
 _TRIED = 5
 # Slopes on both sides agree when they differ by less than this share.
 _ALIKE = 0.5
+# Share of the gap between both sides of a jump that one step makes.
+_ONE_STEP = 0.8
 # Share of the range within which nothing moves.
 _STILL = 0.02
 # Both channels jumped when one leaves its sequence at least this share as far, and by
@@ -19,6 +38,8 @@ _STILL = 0.02
 _BOTH, _FAR = 0.2, 10.0
 # Standard errors from which on a slope is known.
 _KNOWN = 5.0
+# Standard errors of a slope that two sides of a jump may differ by.
+_UNSURE = 3.0
 # Share of the movement that must be more than scatter.
 _REAL = 0.2
 # Movements over this share of the range make a cycle, in so many of which a zero shows.
@@ -55,47 +76,77 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
     """Return the clearest jump of a zero, or None.
 
     Where noise is larger than the steps between rows, means of rows tell more.
-
-    Args:
-        x: deformation, without wild readings, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading.
     """
-    for row in possible_jumps(x, y, scatter)[:_TRIED]:
-        if (jump := _jump(x, y, int(row), REACH, scatter)) is not None:
-            return jump
-    block = max(_block(x), _block(y))
-    for first in (0, block // 2) if block > 1 else ():
-        edges = np.arange(first, x.size, block)
-        mean_x, mean_y = (np.add.reduceat(v, edges)[:-1] / block for v in (x, y))
-        places = possible_jumps(mean_x, mean_y, scatter / np.sqrt(block))
-        for edge in edges[places[:_TRIED]].tolist():
-            near = np.arange(edge - block, edge + block + 1)
-            row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
-            if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
-                return jump
-    return _between_cycles(x, y, scatter) or _beyond_all(x, y, scatter)
+    for block in sorted({1, max(_block(x), _block(y))}):
+        for first in sorted({0, block // 2}):
+            edges = np.arange(first, x.size, block)
+            mean_x, mean_y = (
+                values if block == 1 else np.add.reduceat(values, edges)[:-1] / block
+                for values in (x, y)
+            )
+            blur = scatter / np.sqrt(block)
+            for place, turns in _possible(mean_x, mean_y, blur)[:_TRIED]:
+                row = int(edges[place])
+                if block > 1:
+                    near = np.arange(row - block, row + block + 1)
+                    row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
+                jump = _jump(x, y, row, REACH * block, scatter, in_cycles=turns)
+                if jump is not None:
+                    return jump
+    return _beyond_all(x, y, scatter)
 
 
-def _between_cycles(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
-    """Return a jump at a turn or without load, which moves the cycles after it.
+def _possible(x: np.ndarray, y: np.ndarray, scatter: float) -> list[tuple[int, bool]]:
+    """Return rows before which a zero may have jumped, the clearest first.
 
-    One channel leaves its own sequence there. The curve does not tell where it goes on,
-    but the movements next to it do.
+    A channel steps there as it does nowhere else near. Where the movement turns, or
+    rests without load, only one channel may do so, and the cycles have to tell more.
+
+    Returns:
+        Each row, and whether the movement turns there.
     """
     rows = looked_at(x, y)
     rows = rows[(rows >= SIDE) & (rows <= x.size - SIDE)]
-    if not rows.size:
-        return None
-    off_x, off_y = off_sequence(x, rows), off_sequence(y, rows)
-    least_x, least_y = LEAST * spread(x), LEAST * spread(y)
-    for row in rows[off_x != off_y][:_TRIED].tolist():
-        jump = _jump(x, y, row, REACH, scatter, in_cycles=True)
-        if jump is None:
-            continue
-        if abs(jump.deformation) > least_x or abs(jump.force) > least_y:
-            return jump
-    return None
+    if rows.size < 2 * SIDE:
+        return []
+    (off_x, far_x), (off_y, far_y) = _off(x, rows), _off(y, rows)
+    straight = _one_way(x, rows, scatter)
+    if scatter:
+        # The force shows the way too, and trembles less.
+        straight |= _one_way(y, rows, noise_sd(y))
+    found = np.where(straight, off_x | off_y, off_x != off_y)
+    clearest = np.argsort(-np.maximum(far_x, far_y))
+    clearest = clearest[found[clearest]]
+    return [*zip(rows[clearest].tolist(), (~straight[clearest]).tolist(), strict=True)]
+
+
+def _off(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    steps = values[rows] - values[rows - 1]
+    near = windows(np.diff(values, prepend=values[0]), rows, _NEAR)
+    level = median(near)
+    off = steps - level
+    usual = Usual.of(off, resolution(values))
+    with np.errstate(all="ignore"):
+        others = np.nanmax(np.abs(near - level[:, None]), axis=1)
+    alone = others <= _OTHERS * np.abs(off)
+    return usual.surprised(off, values.size) & alone, np.abs(off) / usual.scale
+
+
+def _one_way(values: np.ndarray, rows: np.ndarray, scatter: float) -> np.ndarray:
+    """Tell where a channel moves the same way before and after a row, or rests."""
+    sides = [windows(values, rows, o) for o in (np.arange(-REACH, 0), np.arange(REACH))]
+    with np.errstate(all="ignore"):
+        reach = [np.nanmax(each, axis=1) - np.nanmin(each, axis=1) for each in sides]
+    rests = [each < _RESTS * np.median(np.hstack(reach)) for each in reach]
+    ways = []
+    for each, still in zip(sides, rests, strict=True):
+        steps = np.diff(each, axis=1)
+        way, path = np.nansum(steps, axis=1), np.nansum(np.abs(steps), axis=1)
+        # steps of a gauge that trembles, 2/√π of its sd each
+        shaken = 1.13 * scatter * np.sum(np.isfinite(steps), axis=1)
+        moves = np.abs(way) >= _PROGRESS * (path - shaken)
+        ways.append(np.where(still, 0.0, np.where(moves, way, np.nan)))
+    return ~np.isnan(ways[0] + ways[1]) & (ways[0] * ways[1] >= 0.0)
 
 
 def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
@@ -141,19 +192,17 @@ def _jump(
     row: int,
     reach: int,
     scatter: float,
-    in_cycles: bool = False,
+    *,
+    in_cycles: bool,
 ) -> Jump | None:
-    """Return the jump before a row, None where the curve does not go on after it.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-        row: the first one after it.
-        reach: rows on each side that tell its size.
-        scatter: sd of the deformation's reading.
-        in_cycles: only where the record has cycles, of some rows each.
-    """
+    """Return the jump before a row, None where the curve does not go on after it."""
+    if not in_cycles and not _in_one_step(x, y, row, reach, scatter):
+        return None
     jump = _measured(x, y, row, reach, scatter)
+    if abs(jump.deformation) < LEAST * spread(x) and abs(jump.force) < LEAST * spread(
+        y
+    ):
+        return None
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
     # through the scatter of the deformation
@@ -188,23 +237,39 @@ def _measured(
         off.append(float(values[row] - values[row - 1]) - usual)
         typical = float(np.median(np.abs(steps - usual))) + 0.5 * abs(usual)
         ratio.append(abs(off[-1]) / (typical + resolution(values)))
-    if min(ratio) > max(_BOTH * max(ratio), _FAR):
+    # A part that is set back goes along its curve, as far as the slope is known.
+    blur = np.sqrt(left @ left / dx.size / max(square, 1e-300)) * abs(off[0])
+    along = abs(off[1] - slope * off[0]) <= LEAST * spread(y) + _UNSURE * blur
+    if min(ratio) > max(_BOTH * max(ratio), _FAR) and not along:
         return Jump(row, "both", off[0], off[1])
     if ratio[1] >= ratio[0]:
         return Jump(row, "force", 0.0, rise - slope * run if known else off[1])
     return Jump(row, "deformation", run - rise / slope if known else off[0], 0.0)
 
 
+def _in_one_step(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> bool:
+    """Tell whether one step makes up the gap between both sides, within the noise.
+
+    At the knee of a preload several steps do.
+    """
+    before, after = slice(max(row - reach, 0), row), slice(row, row + reach)
+    runs = [np.diff(x[part]) for part in (before, after)]
+    rises = [np.diff(y[part]) for part in (before, after)]
+    run, rise = np.concatenate(runs), np.concatenate(rises)
+    moved = run != 0.0
+    slope = float(np.median(rise[moved] / run[moved])) if moved.any() else 0.0
+    left = y - slope * x
+    gap = float(np.median(left[after]) - np.median(left[before]))
+    blur = noise_sd(y, fewest=3) + abs(slope) * scatter
+    return abs(left[row] - left[row - 1]) + 4.0 * blur >= _ONE_STEP * abs(gap)
+
+
 def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
     """Tell whether the curve goes on with the same slope, over many rows.
 
     A part that broke has another one, or none.
-
-    Args:
-        x: deformation, the jump taken out, shape (n,).
-        y: force, likewise.
-        row: the first one after it.
-        turns: rows at which the movement turns.
     """
     edges = np.r_[0, turns, x.size]
     left = edges[edges <= row - SIDE].max(initial=0)
@@ -235,13 +300,6 @@ def _stays(
 
     A part that gives way in one cycle has another loop in the next one, but about the
     same centre; a zero that jumped moves the centre. Only cycles can tell.
-
-    Args:
-        x: deformation, the jump taken out, shape (n,).
-        y: force, likewise.
-        after: which rows come after it.
-        jump: that was taken out.
-        turning: rows at which the movement turns, and its first sign.
     """
     turns, sign = turning
     if turns.size < _CYCLES:

@@ -72,12 +72,7 @@ class Usual:
 
 
 def looked_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the rows at which a fault may be: all of them in a short record.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-    """
+    """Return the rows at which a fault may be: all of them in a short record."""
     n = x.size
     if n <= MOST_ROWS:
         return np.arange(n)
@@ -155,11 +150,6 @@ def residuals(x: np.ndarray, y: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return how far rows lie from a robust line through their neighbours.
 
     NaN at rows with fewer than three neighbours on either side.
-
-    Args:
-        x: shape (n,).
-        y: shape (n,).
-        rows: to look at.
     """
     offsets = np.r_[-REACH:0, 1 : REACH + 1]
     near_x = windows(x, rows, offsets) - x[rows, None]

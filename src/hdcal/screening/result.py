@@ -14,7 +14,6 @@ Kind = Literal[
     "wild reading",
     "opposite sign",
     "negative slope",
-    "clock",
     "saturation of the force",
     "saturation of the deformation",
     "scatter of the deformation",
@@ -58,7 +57,7 @@ class Observation:
         kind: what it is.
         rows: first and last row of each stretch that it concerns, from 0.
         size: how large it is, in `unit`.
-        unit: of the size.
+        unit: unit of the size.
         action: what was done about it.
         run: index of the run.
         where: the rows as their file names them.
@@ -90,7 +89,7 @@ class StraightPart:
         low: smallest deformation of it, as read [mm].
         high: largest deformation of it, as read [mm].
         rows: which rows it has, shape (n,); other branches have none of them.
-        slope: of the force over the deformation there, by least squares [N/mm].
+        slope: slope of the force over the deformation there, by least squares [N/mm].
         slope_sd: its standard error [N/mm].
         whole: whether every movement of the run is straight.
     """
@@ -113,7 +112,6 @@ class Screening:
         kept: which rows stay in the record, shape (n,).
         deformation: with each jump of its zero taken out [mm], shape (n,).
         force: likewise, turned where its sign was opposite [N], shape (n,).
-        time: counted on where the clock was reset [s], shape (n,), or None.
         zero: counts the jumps of a zero before each row in its run, shape (n,).
         deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
         trembling: whether that scatter hides the direction of the movement.
@@ -129,7 +127,6 @@ class Screening:
     kept: np.ndarray
     deformation: np.ndarray
     force: np.ndarray
-    time: np.ndarray | None
     zero: np.ndarray
     deformation_sd: float = 0.0
     trembling: bool = False

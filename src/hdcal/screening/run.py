@@ -12,15 +12,11 @@ class Run:
     """One run on its way through the screening; rows are those of the run.
 
     Attributes:
-        index: of the run.
-        rows: of the whole record, in order.
-        x: deformation, corrected so far.
-        y: force, corrected so far.
-        time: corrected so far, or None.
-        segment: of each row.
+        index: index of the run.
+        rows: its rows in the whole record, in order.
+        segment: segment of each row.
         kept: which rows stay.
         zero: jumps before each row.
-        scatter: sd of the deformation's reading.
         plain: whether a straight line explains it.
         observations: so far.
     """
@@ -29,7 +25,6 @@ class Run:
     rows: np.ndarray
     x: np.ndarray
     y: np.ndarray
-    time: np.ndarray | None
     segment: np.ndarray
     kept: np.ndarray
     zero: np.ndarray
@@ -43,22 +38,19 @@ class Run:
         rows: np.ndarray,
         x: np.ndarray,
         y: np.ndarray,
-        time: np.ndarray | None = None,
         index: int = 0,
     ) -> "Run":
         """Return some rows of a record, all of them kept.
 
         Args:
-            rows: of the record, in order, shape (r,).
+            rows: rows of the record, in order, shape (r,).
             x: deformation of the record, shape (n,).
             y: force of the record, shape (n,).
-            time: of the record, or None.
-            index: of the run.
+            index: index of the run.
         """
-        clock = None if time is None else time[rows]
         segment, zero = np.zeros((2, rows.size), int)
         kept = np.ones(rows.size, bool)
-        return cls(index, rows, x[rows], y[rows], clock, segment, kept, zero)
+        return cls(index, rows, x[rows], y[rows], segment, kept, zero)
 
     def observe(
         self, kind: Kind, rows: np.ndarray, size: float, unit: str, action: Action

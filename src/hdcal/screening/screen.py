@@ -6,10 +6,9 @@ from hdcal.screening.branches import name_segments, straight_part
 from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
 from hdcal.screening.faults import look_at
-from hdcal.screening.plain import plain_runs
 from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run
-from hdcal.screening.sign import Sign, sign_of_slope
+from hdcal.screening.sign import Sign, plain_runs, sign_of_slope
 from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 
@@ -20,7 +19,6 @@ _FEWEST_FOR_SIGN = 5
 def screen(
     deformation: np.ndarray,
     force: np.ndarray,
-    time: np.ndarray | None = None,
     run: np.ndarray | None = None,
     *,
     whole: bool = True,
@@ -31,7 +29,6 @@ def screen(
     Args:
         deformation: as read [mm], in the order it was taken, shape (n,).
         force: as read [N], shape (n,).
-        time: as read [s], shape (n,); None when not measured.
         run: index of the mounting, shape (n,); by default one.
         whole: whether these are all runs. Of some of them nobody knows whether the sign
             is opposite in every run, so that it is asked about and not turned.
@@ -40,32 +37,28 @@ def screen(
     """
     x, y = np.array(deformation, float), np.array(force, float)
     n = x.size
-    clock_read = None if time is None else np.array(time, float)
     index = np.zeros(n, int) if run is None else np.asarray(run)
     order = np.argsort(index, kind="stable")
     cuts = np.flatnonzero(np.diff(index[order])) + 1
     runs = []
     plain = plain_runs(x, y, index)
     for rows in np.split(order, cuts) if n else []:
-        one = Run.of(rows, x, y, clock_read, int(index[rows[0]]))
+        one = Run.of(rows, x, y, int(index[rows[0]]))
         one.plain = bool(plain[one.index])
         look_at(one)
         runs.append(one)
     _signs(runs, wanted, whole=whole)
     for one in runs:
         name_segments(one)
-    return _gathered(runs, n, clock_read)
+    return _gathered(runs, n)
 
 
-def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
+def _gathered(runs: list[Run], n: int) -> Screening:
     """Return the screened runs as one record."""
     columns = {name: np.zeros(n) for name in ("x", "y", "segment", "kept", "zero")}
-    time = None if time is None else time.copy()
     for one in runs:
         for name, values in columns.items():
             values[one.rows] = getattr(one, name)
-        if time is not None and one.time is not None:
-            time[one.rows] = one.time
     scatter = max((one.scatter for one in runs), default=0.0)
     span = max((float(np.ptp(one.x)) for one in runs), default=0.0)
     return Screening(
@@ -74,7 +67,6 @@ def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
         columns["kept"].astype(bool),
         columns["x"],
         columns["y"],
-        time,
         columns["zero"].astype(int),
         scatter,
         10.0 * scatter > HIDDEN * span,

@@ -1,4 +1,4 @@
-"""Sign conventions of force and deformation."""
+"""Signs of force and deformation, and short runs with nothing to look for."""
 
 from itertools import pairwise
 from typing import Literal
@@ -14,6 +14,13 @@ _BRANCH = 0.2
 # standard errors beyond which it is no chance.
 _CLEAR = 0.9
 _CHANCE = 3.5
+# From more rows on the scatter of the deformation can be seen, and is looked for.
+_MOST_ROWS = 40
+# What the residuals of a line with independent noise rarely exceed: the largest one,
+# in sd, and the correlation of each with the next one, in its standard errors.
+_LARGEST, _CORRELATED = 2.8, 2.0
+# Share of the range of the force that is noise at most.
+_NOISE = 0.05
 
 
 def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
@@ -22,11 +29,6 @@ def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
     Opposite: the force falls with the deformation all along every branch, loading and
     unloading, as it does when one channel is counted the other way. Unclear: it falls
     in the mean, but not so.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading, through which it turns.
     """
     together = _rank_correlation(x, y)
     if together >= 0.0:
@@ -38,8 +40,7 @@ def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
         for first, last in pairwise(ends)
         if last - first >= 4
     ]
-    opposite = bool(branches) and max(branches) < -_CLEAR
-    if opposite:
+    if branches and max(branches) < -_CLEAR:
         return "opposite"
     return "unclear" if together * np.sqrt(x.size - 1.0) < -_CHANCE else "same"
 
@@ -50,3 +51,34 @@ def _rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
         return 0.0
     ranks = np.array([np.argsort(np.argsort(each[::step])) for each in (x, y)])
     return float(np.corrcoef(ranks[0], ranks[1])[0, 1])
+
+
+def plain_runs(x: np.ndarray, y: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Tell which runs are short, straight and rising, with independent noise.
+
+    Args:
+        x: deformation of all runs, shape (n,).
+        y: force of all runs, shape (n,).
+        run: index of each row's run, shape (n,).
+
+    Returns:
+        By index of the run.
+    """
+    order = np.argsort(run, kind="stable")
+    x, y, run = x[order], y[order], run[order]
+    rows = np.bincount(run)
+    with np.errstate(all="ignore"):
+        x = x - (np.bincount(run, x) / rows)[run]
+        y = y - (np.bincount(run, y) / rows)[run]
+        slope = np.bincount(run, x * y) / np.bincount(run, x * x)
+        left = y - slope[run] * x
+        squares = np.bincount(run, left * left)
+        sd = np.sqrt(squares / rows)
+        largest = np.zeros(rows.size)
+        np.maximum.at(largest, run, np.abs(left))
+        same = np.diff(run) == 0
+        pairs = np.bincount(run[1:][same], (left[1:] * left[:-1])[same], rows.size)
+        correlation = np.abs(pairs / squares) * np.sqrt(rows)
+        noise = sd / np.sqrt(np.bincount(run, y * y) / rows)
+    plain = (rows < _MOST_ROWS) & (slope > 0.0) & (noise < _NOISE)
+    return plain & (largest <= _LARGEST * sd) & (correlation < _CORRELATED)

@@ -31,9 +31,9 @@ class Straight(NamedTuple):
     """The longest straight part of a movement.
 
     Attributes:
-        rows: of the movement.
+        rows: rows of the movement.
         whole: whether it is the whole curve.
-        inflation: of the variance of its slope, by the correlation of neighbours.
+        inflation: factor on the variance of its slope, by correlated neighbours.
     """
 
     rows: slice
@@ -48,12 +48,6 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
     criterion pays for. The longest one covers the largest area of force and
     deformation together, so that neither an approach without force nor a yield
     without a rise of it counts for much.
-
-    Args:
-        x: deformation of one loading, shape (n,).
-        y: force, shape (n,).
-        scatter: sd of the deformation's reading. Lines then lie nearest to the points
-            in the noises of both channels.
     """
     points = min(_POINTS, x.size)
     if points < 2 * _FEWEST_POINTS:
@@ -97,13 +91,7 @@ def _means(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _costs(x: np.ndarray, y: np.ndarray, *, both: bool) -> np.ndarray:
-    """Return the squares left by a line through points a … b-1, shape (m+1, m+1).
-
-    Args:
-        x: shape (m,).
-        y: shape (m,).
-        both: whether both scatter by the same: squares are across the line then.
-    """
+    """Return the squares left by a line through points a … b-1, shape (m+1, m+1)."""
     terms = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     sums = np.hstack([np.zeros((6, 1)), np.cumsum(terms, axis=1)])
     n, sx, sy, sxx, sxy, syy = sums[:, None, :] - sums[:, :, None]

@@ -30,10 +30,6 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
 def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
     """Rows at which the direction of movement reverses by more than a threshold.
 
-    Args:
-        x: deformation in the order it was taken [mm], shape (n,).
-        threshold: smallest reversal that counts [mm].
-
     Returns:
         The rows of the reversals in order, and the sign of the first movement,
         0 when x never moves by the threshold.

@@ -33,10 +33,6 @@ def wild_readings(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     Each row is compared with a robust line through its neighbours, so that several
     wild ones cannot hide each other. It has to be unusual on the curve of force over
     deformation, and in the sequence of one of the two channels.
-
-    Args:
-        x: deformation, shape (n,).
-        y: force, shape (n,).
     """
     if x.size < FEWEST:
         return np.array([], int), np.array([])

@@ -5,126 +5,88 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.quantities import Quantities
-from hdcal.screening.result import Observation
+from hdcal.screening.result import Kind, Observation
 
 # Stretches of rows that one sentence names.
 _LISTED = 4
-_REMEDIES = {
-    "clock": (
-        "the clock goes back by {size} s at {rows}",
-        "Keep the order of taking; label runs in a column 'run' if a new test begins",
-    ),
-    "negative slope": (
-        "the {force} falls as the {deformation} grows, by {size} {slope} in the mean, "
-        "but not all along: no stiffness can be told from it",
-        "Check which columns are {force} and {deformation}, and their signs; or choose "
-        "the part that is meant by `range`",
-    ),
+_ZERO = "the rows from there on are moved back by it, as a run with its own zero"
+_CUT = "{count} left out ({rows}): "
+_SENTENCES: dict[Kind, str] = {
+    "before the tare": "{count} at the beginning left out ({rows}): read before the "
+    "tare, {size} {unit} from where the record goes on",
+    "jump of the force": "the zero of the {load} jumps by {signed} {unit} at {rows}: "
+    + _ZERO,
+    "jump of the deformation": "the zero of the {displacement} jumps by {signed} "
+    "{unit} at {rows}: " + _ZERO,
+    "jump of both": "{load} and {displacement} jump at {rows}, the {load} by {signed} "
+    "{unit}: " + _ZERO,
+    "wild reading": _CUT + "wild readings, up to {size} {unit} from the curve of their "
+    "neighbours",
+    "opposite sign": "the {load} falls as the {displacement} grows, by {size} {N/mm}, "
+    "on every branch: one of the two is counted with the opposite sign. The sign of "
+    "the {load} is turned",
+    "negative slope": "the {load} falls as the {displacement} grows, by {size} {N/mm} "
+    "in the mean, but not all along: no stiffness follows from it",
+    "saturation of the force": _CUT + "the {load} stands at its limit of {signed} "
+    "{unit} while the {displacement} goes on",
+    "saturation of the deformation": _CUT + "the {displacement} stands at its limit of "
+    "{signed} {unit} while the {load} goes on",
+    "scatter of the deformation": "the reading of the {displacement} scatters by "
+    "{size} {unit} (sd), which the {load} does not follow: each row is moved along the "
+    "line to the {displacement} smoothed over the rows",
+    "after the largest force": _CUT + "the {load} has dropped by {size} {unit} for "
+    "good while the {displacement} goes on",
+    "repeated reading": "{count} left out: each reading stands in {size} rows, as the "
+    "logger is faster than the gauges",
+    "outside the range": "{count} left out: outside the working range of {range}",
 }
-_SENTENCES = {
-    ("before the tare", "cut"): "{count} at the beginning left out ({rows}): read "
-    "before the tare, {size} {unit} from where the record goes on",
-    ("jump of the force", "new zero"): "the zero of the {force} jumps by {size} "
-    "{unit} at {rows}: the rows from there on are moved back by it, as a run with its "
-    "own zero",
-    ("jump of the deformation", "new zero"): "the zero of the {deformation} jumps by "
-    "{size} {unit} at {rows}: the rows from there on are moved back by it, as a run "
-    "with its own zero",
-    ("jump of both", "new zero"): "{force} and {deformation} jump at {rows}, the "
-    "{force} by {size} {unit}: the rows from there on are moved back, as a run with "
-    "its own zero",
-    ("wild reading", "cut"): "{count} left out ({rows}): wild readings, up to {size} "
-    "{unit} from the curve of their neighbours",
-    ("opposite sign", "turned"): "the {force} falls as the {deformation} grows, by "
-    "{size} {slope}, on every branch: one of the two is counted with the opposite "
-    "sign. The sign of the {force} is turned",
-    ("clock", "new zero"): "the clock goes back by {size} s at {rows} while the test "
-    "goes on: the time is counted on from there",
-    ("clock", "cut"): "{count} at the end left out ({rows}): the clock was reset",
-    ("saturation of the force", "cut"): "{count} left out ({rows}): the {force} "
-    "stands at its limit of {size} {unit} while the {deformation} goes on",
-    ("saturation of the deformation", "cut"): "{count} left out ({rows}): the "
-    "{deformation} stands at its limit of {size} {unit} while the {force} goes on",
-    ("scatter of the deformation", "smoothed"): "the reading of the "
-    "{deformation} scatters by {size} {unit} (sd), which the {force} does not follow: "
-    "each row is moved along the line to the {deformation} smoothed over the rows",
-    ("after the largest force", "cut"): "{count} left out ({rows}): the {force} "
-    "has dropped by {size} {unit} for good while the {deformation} goes on",
-    ("repeated reading", "cut"): "{count} left out: each reading stands in {size} "
-    "rows, as the logger is faster than the gauges",
-    ("outside the range", "cut"): "{count} left out: outside the working range of "
-    "{range}",
-}
-_HIDDEN_DIRECTION = (
-    "the scatter of the {deformation} hides the direction of its movement: loading and "
-    "unloading are not told apart"
+_CHOOSE = (
+    "Check which columns are {load} and {displacement}, and their signs; or choose the "
+    "part that is meant by `range`"
+)
+_HIDDEN = (
+    "the scatter of the {displacement} hides the direction of its movement: loading "
+    "and unloading cannot be distinguished"
 )
 
 
 def in_words(
     found: Observation, labels: np.ndarray, working_range: str, units: Quantities
 ) -> Observation:
-    """Return a finding with its rows and its sentence.
-
-    Args:
-        found: that was decided about.
-        labels: name of each row in its file.
-        working_range: in words.
-        units: of what was measured.
-    """
-    facts = _facts(found, labels, units) | {"range": working_range}
-    words = _SENTENCES[found.kind, found.action].format(**facts)
-    where, unit = rows_words(found, labels), units.unit(found.unit)
+    """Return a finding with its rows and its sentence; labels are names of all rows."""
+    words = _sentence(found, labels, units).replace("{range}", working_range)
+    where, unit = _rows(found, labels), units.unit(found.unit)
     return replace(found, where=where, words=words, unit=unit)
 
 
 def question(
     found: Observation, labels: np.ndarray, units: Quantities
 ) -> tuple[str, str]:
-    """Return problem and remedy of a finding that the user has to decide about.
-
-    Args:
-        found: whose action is `asked`.
-        labels: name of each row in its file.
-        units: of what was measured.
-    """
-    problem, remedy = _REMEDIES[found.kind]
-    facts = _facts(found, labels, units)
-    return problem.format(**facts), remedy.format(**facts)
+    """Return problem and remedy of a finding that the user has to decide about."""
+    return _sentence(found, labels, units), units.say(_CHOOSE)
 
 
 def hidden_direction(units: Quantities) -> str:
-    """Return that loading and unloading cannot be told apart."""
-    return _HIDDEN_DIRECTION.format(**_names(units))
+    """Return that loading and unloading cannot be distinguished."""
+    return units.say(_HIDDEN)
 
 
-def _names(units: Quantities) -> dict[str, str]:
-    return {
-        "force": units.load,
-        "deformation": units.displacement,
-        "slope": units.stiffness_unit,
+def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
+    text = units.say(_SENTENCES[found.kind])
+    facts = {
+        "{count}": f"{found.count} row{'s' if found.count > 1 else ''}",
+        "{rows}": _rows(found, labels),
+        "{size}": f"{abs(found.size):.4g}",
+        "{signed}": f"{found.size:.4g}",
+        "{unit}": units.unit(found.unit),
     }
+    for placeholder, fact in facts.items():
+        text = text.replace(placeholder, fact)
+    return text
 
 
-def _facts(found: Observation, labels: np.ndarray, units: Quantities) -> dict[str, str]:
-    count = f"{found.count} row{'s' if found.count > 1 else ''}"
-    size = f"{abs(found.size) if found.kind in _UNSIGNED else found.size:.4g}"
-    rows = rows_words(found, labels)
-    facts = {"count": count, "rows": rows, "size": size}
-    return facts | {"unit": units.unit(found.unit)} | _names(units)
-
-
-_UNSIGNED = {"clock", "wild reading", "after the largest force", "before the tare"}
-_UNSIGNED |= {"opposite sign", "negative slope"}
-
-
-def rows_words(found: Observation, labels: np.ndarray) -> str:
-    """Return the rows of a finding as their file names them.
-
-    Args:
-        found: the finding.
-        labels: name of each row in its file.
-    """
+def _rows(found: Observation, labels: np.ndarray) -> str:
+    """Return the rows of a finding as their file names them."""
     each = [
         f"{labels[first]}" if first == last else f"{labels[first]}-{labels[last]}"
         for first, last in found.rows[:_LISTED]

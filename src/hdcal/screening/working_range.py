@@ -99,10 +99,10 @@ def in_range(
     """Return a screening in which the rows outside the range are cut.
 
     Args:
-        screening: of the whole record.
+        screening: result for the whole record.
         wanted: the range.
         run: index of each row's run, shape (n,).
-        units: of what was measured.
+        units: units of the readings.
     """
     part = screening.straight
     if wanted.unit == STRAIGHT and part is not None:

@@ -118,13 +118,7 @@ def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior
 
 
 def contact_as_read(contact: Prior, gauge: Prior) -> Prior:
-    """Return the prior of the deformation that is read at first contact.
-
-    Args:
-        contact: prior of what is read there on a gauge without error [mm]. One that
-            is neither normal nor fixed stays as it is.
-        gauge: what the certificate of the gauge states [mm].
-    """
+    """Return the prior of the deformation that is read at first contact."""
     if contact.family not in ("normal", "fixed"):
         return contact
     middle, own = (*map(float, contact.numbers), 0.0)[:2]

@@ -20,13 +20,7 @@ def gear_text(
     measurement: Mapping[str, str | float],
     columns: Mapping[str, str],
 ) -> str:
-    """Return the text of a gear file.
-
-    Args:
-        gear: the table [gear]; the keys that are known.
-        measurement: the table [measurement].
-        columns: quantity -> header with its unit, the table [columns].
-    """
+    """Return the text of a gear file."""
     tables = {"gear": gear, "measurement": measurement, "columns": columns}
     return "\n".join(
         line for name, rows in tables.items() for line in _table(name, rows)

@@ -1,11 +1,11 @@
 """One entry of a prior table: family, numbers and unit, into code units."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ValidationInfo, create_model
 
-from hdcal.data.gear_file.toml_file import TomlFile
+from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean
 from hdcal.data.gear_file.validation import STRICT, checked, fault
 from hdcal.data.plausible import RANGES, out_of_range, range_of
 from hdcal.data.prior import FAMILIES, Prior, scaled
@@ -43,16 +43,11 @@ def _above_low(number: float, info: ValidationInfo) -> float:
     return number
 
 
-class _Unknown(BaseModel):
-    """An entry of a family that does not exist."""
-
-    family: Literal["fixed", "normal", "lognormal", "half_normal", "uniform", "beta"]
-
-
 class _Entry(BaseModel):
     """Part of an entry of any family."""
 
     model_config = STRICT
+    family: str
     unit: Annotated[str, AfterValidator(_known_unit)] | None = None
     source: Any = None
     note: Any = None
@@ -70,10 +65,10 @@ _NUMBERS: dict[str, Any] = {
 
 def _entry_of(family: str) -> type[_Entry]:
     """Return the model of the entries of a family."""
-    fields: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         n: (_NUMBERS.get(n, float), ...) for n in FAMILIES[family]
     }
-    return create_model(family, __base__=_Entry, family=(str, ...), **fields)
+    return create_model(family, __base__=_Entry, **numbers)
 
 
 _ENTRIES = {family: _entry_of(family) for family in FAMILIES}
@@ -100,9 +95,11 @@ def read_prior(
         example = f'{{ family = "normal", mean = 0.0, sd = 1.0, unit = "{unit or 1}" }}'
         words = "is not a table with a family and its numbers"
         raise toml.error(words, f"Write {example}", key)
-    kind = _ENTRIES.get(str(entry.get("family")), _Unknown)
-    table: Any = checked(kind, entry, toml, key, unit)
-    family, name = table.family, key.rpartition(".")[2]
+    family, name = str(entry.get("family", "")), key.rpartition(".")[2]
+    if family not in _ENTRIES:
+        words = f"unknown choice '{family}'" if family else "is missing"
+        raise toml.error(words, did_you_mean(family, [*FAMILIES]), f"{key}.family")
+    table: Any = checked(_ENTRIES[family], entry, toml, key, unit)
     if table.unit is None and unit is not None and name in _UNIT_NEEDED:
         remedy = f'Write unit = "{_UNIT_NEEDED[name]}"'
         raise toml.error("is given without a unit", remedy, key)

@@ -37,10 +37,6 @@ def rig_fact_priors(facts: RigTable, radial_per_read: float) -> dict[str, Prior]
     """Return the effects' priors that a rig's facts sharpen, by `effect.parameter`.
 
     An error of a gauge is a share of its range, not of what was read of it.
-
-    Args:
-        facts: of the rig, its deformations as read.
-        radial_per_read: radial deformation per deformation as read.
     """
     priors, shipped = {}, effect_priors()
 
@@ -77,7 +73,7 @@ def correlation_prior(
         cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
         deformation: in the order it was taken [mm], shape (n,).
         run: index of the mounting, shape (n,).
-        time: of the readings [s], shape (n,); None where it was not measured.
+        time: time of the readings [s], shape (n,); None where it was not measured.
     """
     steps = np.diff(time) if cutoff is not None and time is not None else np.array([])
     if cutoff is not None and np.any(steps > 0.0):
@@ -91,12 +87,7 @@ def correlation_prior(
 
 
 def rows_of_half_cycle(deformation: np.ndarray, run: np.ndarray) -> float:
-    """Return the median number of rows between two turns of the loading.
-
-    Args:
-        deformation: in the order it was taken [mm], shape (n,).
-        run: index of the mounting, shape (n,).
-    """
+    """Return the median number of rows between two turns of the loading."""
     lengths: list[int] = []
     order = np.argsort(run, kind="stable")
     cuts = np.flatnonzero(np.diff(run[order])) + 1

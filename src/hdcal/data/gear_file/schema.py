@@ -18,7 +18,7 @@ from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.gear_file.validation import STRICT, fault, within
 from hdcal.data.plausible import range_of
 from hdcal.data.theory_names import READINGS, SPRING, Theory
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, InputError
 from hdcal.screening.working_range import FORM, read_range
 
 _Size = Annotated[float, within("size")]
@@ -83,7 +83,7 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     A key that no table has is put into [gear], where the schema refuses it.
 
     Raises:
-        InputError: a key is no text, or is stated twice.
+        InputError: a key is stated twice.
     """
     plain = _with_text_keys(source)
     tables: dict[str, Any] = {"gear": {}}
@@ -100,21 +100,11 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     return tables
 
 
-def _with_text_keys(source: Mapping[Any, Any], above: str = "") -> dict[str, Any]:
-    """Return a mapping and those in it as dictionaries, if all keys are texts."""
-    plain = {}
-    with Findings() as wrong:
-        for key, value in source.items():
-            place = f"{above}{key}"
-            if not isinstance(key, str):
-                words = "the key is no text"
-                remedy = "Write names of tables and their entries as texts"
-                wrong.append(Finding("gear", words, remedy, None, place))
-            elif isinstance(value, Mapping):
-                plain[key] = wrong.attempt(_with_text_keys, value, f"{place}.")
-            else:
-                plain[key] = value
-    return plain
+def _with_text_keys(source: Any) -> Any:
+    """Return a mapping and those in it as dictionaries with texts for keys."""
+    if not isinstance(source, Mapping):
+        return source
+    return {str(key): _with_text_keys(value) for key, value in source.items()}
 
 
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
@@ -154,11 +144,7 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
 
 
 def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Return which sizes cannot be beside the others: name, problem and remedy.
-
-    Args:
-        size: by name [mm]; any may be missing.
-    """
+    """Return which sizes cannot be beside the others: name, problem and remedy."""
     radius = size.get("radius", math.inf)
     both = "Check both sizes"
     faults = [

@@ -1,6 +1,7 @@
 """Checks of tables by pydantic, and the translation of its errors into findings."""
 
 import re
+from collections.abc import Iterator
 from typing import Any, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
@@ -57,19 +58,39 @@ def checked(
     try:
         return kind.model_validate(data, context=context)
     except ValidationError as error:
-        faults = error.errors()
-    findings = []
-    for one in faults:
+        raise InputError(
+            toml.finding(problem, remedy, ".".join(filter(None, [key, *place])))
+            for place, problem, remedy in _faults(error, kind)
+        ) from None
+
+
+def requested(kind: type[M], context: Any, **given: Any) -> M:
+    """Return the request that parameters make.
+
+    Raises:
+        InputError: holds everything that is wrong with them.
+    """
+    try:
+        return kind.model_validate(given, context=context)
+    except ValidationError as error:
+        every = _faults(error, kind)
+        findings = [Finding(place[0], problem, how) for place, problem, how in every]
+        raise InputError(dict.fromkeys(findings)) from None
+
+
+def _faults(
+    error: ValidationError, kind: type[BaseModel]
+) -> Iterator[tuple[list[str], str, str]]:
+    """Yield place, problem and remedy of each error."""
+    for one in error.errors():
         place = [str(part) for part in one["loc"]]
-        problem, remedy = _words(dict(one), place[-1] if place else key, kind, place)
-        at = ".".join(filter(None, [key, *place]))
-        findings.append(toml.finding(problem, remedy, at))
-    raise InputError(findings)
+        yield place, *_words(dict(one), place, kind)
 
 
-def _words(error: dict, name: str, model: Any, place: list[str]) -> tuple[str, str]:
+def _words(error: dict, place: list[str], model: Any) -> tuple[str, str]:
     """Return problem and remedy of an error of pydantic at a key of a model."""
-    kind, example = error["type"], _EXAMPLES.get(name, f"{name} = … (a number)")
+    kind, name = error["type"], place[-1] if place else ""
+    example = _EXAMPLES.get(name, f"{name} = … (a number)")
     if kind == _FAULT:
         return error["ctx"]["problem"], error["ctx"]["remedy"]
     if kind == "extra_forbidden":
@@ -82,30 +103,7 @@ def _words(error: dict, name: str, model: Any, place: list[str]) -> tuple[str, s
         return "is missing", f"Add it: {example}"
     if kind == "literal_error":
         known = re.findall(r"'([^']+)'", error["ctx"]["expected"])
-        value = str(error["input"])
-        return f"unknown choice '{value}'", did_you_mean(value, known)
-    words = error["msg"][:1].lower() + error["msg"][1:]
-    return words, f"Write it like {example}"
-
-
-def requested(kind: type[M], context: Any, **given: Any) -> M:
-    """Return the request that parameters make.
-
-    Args:
-        kind: of the request.
-        context: of its validators.
-        given: parameters by name.
-
-    Raises:
-        InputError: holds everything that is wrong with them.
-    """
-    try:
-        return kind.model_validate(given, context=context)
-    except ValidationError as error:
-        faults = error.errors()
-    findings = []
-    for one in faults:
-        place = [str(part) for part in one["loc"]]
-        problem, remedy = _words(dict(one), place[0], kind, place)
-        findings.append(Finding(place[0], problem, remedy))
-    raise InputError(dict.fromkeys(findings))
+        return f"unknown choice '{error['input']}'", did_you_mean(
+            str(error["input"]), known
+        )
+    return error["msg"][:1].lower() + error["msg"][1:], f"Write it like {example}"

@@ -14,19 +14,13 @@ _LISTED = 3
 def bad_gears(
     findings: FileFindings, rows: np.ndarray, gears: Any
 ) -> dict[str, Finding]:
-    """Return the gears with a faulty row, each with its first fault.
-
-    Args:
-        findings: on the file.
-        rows: row of the source of each reading, shape (n,).
-        gears: label of each reading's, shape (n,); empty where a row names none.
-    """
+    """Return the gears with a faulty row, each with its first fault."""
     bad: dict[str, Finding] = {}
     places = np.flatnonzero(np.isin(rows, [*findings.rows])) if findings.rows else ()
     for place in places:
         label = str(gears[place])
         if label and label not in bad:
-            bad[label] = findings.of_row(int(rows[place]))
+            bad[label] = findings.rows[int(rows[place])]
     return bad
 
 
@@ -36,16 +30,11 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 
 
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
-    """Return that bad gears can be left out.
-
-    Args:
-        bad: at least one.
-        many: number of all gears; None where not all of them were read.
-    """
+    """Return that bad gears can be left out; `many` counts all, where it is known."""
     words = f"{len(bad)} of the gears read so far"
     words = words if many is None else f"{len(bad)} of {many} gears"
     words += f" {_be(bad)} bad: {shortened([*map(quoted, bad)], _LISTED)}"
-    remedy = "Ask for it to leave such gears out, whole, and have the others answered"
+    remedy = "Set it to leave these gears out as a whole and evaluate the others"
     return Finding("skip_bad", words, remedy)
 
 

@@ -45,14 +45,6 @@ def case_of(
 ) -> Case:
     """Return what was measured on a gear, or several of its kind, as a case.
 
-    Args:
-        measured: without faults.
-        gear: as its file has it.
-        notes: on how that was read.
-        name: of the case.
-        range: working range; by default that of the gear file.
-        skip_bad: as in `read_case`.
-
     Raises:
         InputError: as `screened`.
     """
@@ -72,15 +64,7 @@ def screened_case(
     notes: Sequence[str],
     name: str,
 ) -> Case:
-    """Return measurements that were screened as a case.
-
-    Args:
-        measured: without the rows that were cut.
-        screening: of all rows; None of those of several parts.
-        gear: as its file has it.
-        notes: on how that was read.
-        name: of the case.
-    """
+    """Return measurements that were screened as a case."""
     if measured.units == TORQUE:
         _require_torsion(gear, name)
     (specimen, gears), (run, runs) = measured.gears, measured.runs

@@ -9,8 +9,8 @@ from hdcal.data.case import Gear
 from hdcal.data.findings import FileFindings
 from hdcal.data.plausible import RANGES
 from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import DIMENSIONS
-from hdcal.data.tables.named_columns import Column
 
 FEWEST_ROWS = 5
 # Kelvin become degrees Celsius with an error of rounding.
@@ -30,7 +30,7 @@ def check_whole(
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
         column = used["deformation"]
-        words = f"the {column.quantity} is constant, so no stiffness can be seen"
+        words = f"the {column.quantity} is constant, which gives no stiffness"
         findings.add(words, "Measure at several", None, column.header)
 
 
@@ -77,12 +77,7 @@ def check_reach(
 
 
 def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Tell which rows have a time before that of their run's last row, shape (n,).
-
-    Args:
-        time: of each row, shape (n,); NaN where it is wrong.
-        run: index of the mounting, shape (n,).
-    """
+    """Tell which rows have a time before that of their run's last row, shape (n,)."""
     order = np.flatnonzero(np.isfinite(time))
     order = order[np.argsort(run[order], kind="stable")]
     # A wild number may overflow here; it has a finding of its own.

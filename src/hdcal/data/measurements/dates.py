@@ -1,7 +1,7 @@
 """Dates of mountings, as rigs and people write them."""
 
-import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,14 +10,11 @@ from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
 # Forms of days; behind points the month stands second, behind slashes anywhere.
-_DAYS = ("ISO8601", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y")
-_TIMES = ("", " %H:%M", " %H:%M:%S", " %I:%M %p", " %I:%M:%S %p")
-_CLOCK = re.compile(r"[T ]+\d{1,2}:\d{2}.*$")
-_DIGIT = re.compile(r"\d")
-_ZONE = re.compile(r"(?<=:\d{2})(\.\d+)?(Z|[+-]\d{2}:?\d{2})$")
+_DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y")
+# A day and a time of day; the local time counts, whatever its zone.
+_STAMP = r"^([\d./-]+)(?:[T ]+(\d{1,2}:\d\d(?::\d\d)?(?:\s*[AP]M)?).*)?$"
 # Before and after these nobody measured: a plain number is no date.
-_EARLIEST, _LATEST = np.datetime64("1950-01-01"), np.datetime64("2100-01-01")
-_NONE = np.datetime64("NaT", "s")
+_EARLIEST, _LATEST = pd.Timestamp("1950-01-01"), pd.Timestamp("2100-01-01")
 _REMEDY = "Write dates as in 2026-09-01, year first"
 
 
@@ -30,29 +27,25 @@ def dates_of(
     are returned, and the note says so, where most cannot be read, or all in two ways.
 
     Args:
-        labels: of each row, shape (n,).
+        labels: date of each row, shape (n,).
         of: index of each row's mounting, shape (n,).
     """
-    if not len(labels):
+    place, texts = pd.factorize(np.array(labels, object))
+    stated: Any = texts != NOT_STATED
+    if not stated.any():
         return (), ""
-    texts, place = np.unique(np.array(labels, object), return_inverse=True)
-    stated = texts != NOT_STATED
-    times, note = np.full(len(texts), _NONE), ""
-    if stated.any():
-        written = texts[stated]
-        ways = _ways(written)
-        if len(ways) != 1:
-            how = "can be read in two ways" if ways else "cannot be read as one"
-            return (), f"dates are not used: {quoted(written[0])} {how}. {_REMEDY}"
-        times[stated] = ways[0]
-        if (unread := np.isnat(ways[0])).any():
-            odd = quoted(written[int(np.argmax(unread))])
-            note = f"the date {odd} cannot be read beside the others. {_REMEDY}"
-    first = np.full(int(np.max(of)) + 1, _NONE)
-    np.fmin.at(first, of, times[place])
-    if np.isnat(first).all():
-        return (), note
-    return tuple("" if np.isnat(one) else str(one) for one in first), note
+    written, note = texts[stated], ""
+    ways = _ways(written)
+    if len(ways) != 1:
+        how = "can be read in two ways" if ways else "cannot be read as one"
+        return (), f"dates are not used: {quoted(written[0])} {how}. {_REMEDY}"
+    if (unread := ways[0].isna().to_numpy()).any():
+        odd = quoted(written[int(np.argmax(unread))])
+        note = f"the date {odd} cannot be read like the others. {_REMEDY}"
+    times: Any = pd.Series(pd.NaT, range(len(texts)), "datetime64[s]")
+    times[stated] = ways[0].to_numpy()
+    first = times[place].groupby(np.asarray(of)).min()
+    return tuple("" if pd.isna(one) else one.isoformat() for one in first), note
 
 
 def days_of(labels: np.ndarray) -> np.ndarray:
@@ -65,40 +58,31 @@ def days_of(labels: np.ndarray) -> np.ndarray:
         Days in ISO 8601, as written where that can be read in two ways, and
         `NOT_STATED` where they cannot be read, shape (n,).
     """
-    stamps, place = np.unique(np.array(labels, object), return_inverse=True)
-    # Few days have many times.
-    written = np.array([_CLOCK.sub("", text) for text in stamps], object)
-    texts, day = np.unique(written, return_inverse=True)
+    place, texts = pd.factorize(np.array(labels, object))
     days = np.full(len(texts), NOT_STATED, object)
     stated = np.flatnonzero(texts != NOT_STATED)
     ways = _ways(texts[stated]) if len(stated) else []
     if len(ways) > 1:
-        days[stated] = texts[stated]
+        days[stated] = pd.Series(texts[stated]).str.extract(_STAMP)[0]
     elif ways:
-        read = ~np.isnat(ways[0])
-        days[stated[read]] = ways[0][read].astype("datetime64[D]").astype(str)
-    return days[day][place]
+        read = ways[0].notna().to_numpy()
+        days[stated[read]] = ways[0][read].dt.strftime("%Y-%m-%d")
+    return days[place]
 
 
-def _ways(texts: np.ndarray) -> list[np.ndarray]:
+def _ways(texts: np.ndarray) -> list[Any]:
     """Return texts as times, in each of the ways in which most of them can be read."""
-    # The local time counts; and a text without a number, such as today, is no date.
-    plain = pd.Series([_ZONE.sub("", t) if _DIGIT.search(t) else "" for t in texts])
-    ways: list[np.ndarray] = []
-    for day in _DAYS:
-        times = pd.Series(pd.NaT, index=plain.index, dtype="datetime64[s]")
-        for time in _TIMES if "%" in day else ("",):
-            if not (rest := times.isna()).any():
-                break
-            read = pd.to_datetime(plain[rest], format=day + time, errors="coerce")
-            times[rest] = read.astype("datetime64[s]")
-        each = times.to_numpy().astype("datetime64[s]")
-        each[~((each > _EARLIEST) & (each < _LATEST))] = _NONE
-        ways.append(each)
+    parts = pd.Series(texts).str.extract(_STAMP)
+    clock: Any = pd.to_datetime(parts[1], format="mixed", errors="coerce")
+    clock = (clock - clock.dt.normalize()).fillna(pd.Timedelta(0))
+    ways: list[Any] = []
+    for form in _DAYS:
+        times = pd.to_datetime(parts[0], format=form, errors="coerce")
+        times = times.where((times > _EARLIEST) & (times < _LATEST))
+        ways.append((times + clock).astype("datetime64[s]"))
     # The way that leaves the fewest unread, and all others that leave as few.
-    least = min(int(np.isnat(times).sum()) for times in ways)
-    best = [times for times in ways if np.isnat(times).sum() == least]
+    least = min(int(times.isna().sum()) for times in ways)
     if 2 * least >= len(texts):
         return []
-    alike = [np.array_equal(best[0], each, equal_nan=True) for each in best]
-    return best[:1] if all(alike) else best
+    best = [times for times in ways if times.isna().sum() == least]
+    return best[:1] if all(best[0].equals(each) for each in best) else best

@@ -1,8 +1,6 @@
 """A folder with a file, or a folder, for each gear."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +16,10 @@ from hdcal.data.measurements.gear_files import (
     gear_labels,
     not_read,
 )
+from hdcal.data.measurements.joining import joined as joined
+from hdcal.data.measurements.joining import labelled
 from hdcal.data.measurements.measurements import Measurements, read_measurements
 from hdcal.data.reading import asked_columns, gear_of
-from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
@@ -55,8 +54,8 @@ def read_gear_folder(
             first gear. Others may differ from it in their sizes.
         columns: as in `read_case`, and so are all that follow.
         theory: overrides the gear file's.
-        reading: of the deformation.
-        encoding: of the files.
+        reading: `radial` or `diametral`.
+        encoding: encoding of the files.
         skip_bad: whether bad gears are left out.
         range: working range.
 
@@ -66,7 +65,7 @@ def read_gear_folder(
     Returns:
         The case, and a table of the sizes of each gear where they have files.
     """
-    asked, (named, _) = (theory, None, reading), asked_columns(data, columns)
+    asked, (named, _) = (theory, reading), asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
     labels, cases = gear_labels(files, folder)
     own = [file.parent / GEAR_NAME for file in files] if cases else []
@@ -95,65 +94,19 @@ def read_gear_folder(
             if each:
                 unread[label] = each
             elif measured is not None:
-                parts.append((_labelled(measured, label), its))
+                parts.append((labelled(measured, label), its))
         wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert common is not None
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
     whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
-    about = [f"each {kind} is a gear, called after it, unless it names gears itself"]
+    about = [f"each {kind} is a gear of that name, unless it has a column of gears"]
     compared = f"the gear file, with sizes at which gears are compared, is {base}"
     about += [*([compared] if own else []), *not_read(files, folder)]
     about += _stated_by_some([part.stated for part, _ in parts])
     name = folder.resolve().name
     case = case_of(whole, common, (*about, *notes), name, range, skip_bad)
     return case, _sizes(parts) if own and common.theory != SPRING else None
-
-
-def _labelled(measured: Measurements, label: str) -> Measurements:
-    """Return measurements with the gear of each row, and the file in its row's name.
-
-    A gear of two files was mounted for each of them.
-    """
-    frame = measured.frame.set_axis([f"{row} of {label}" for row in measured.rows])
-    if "specimen" not in measured.stated:
-        frame = frame.assign(specimen=label)
-    else:
-        runs = frame["run"].cat.rename_categories(lambda run: f"{label} {run}".strip())
-        frame = frame.assign(run=runs)
-    return replace(measured, frame=frame)
-
-
-def joined(
-    parts: Sequence[Measurements], warm: float, bad: Mapping[str, Finding]
-) -> Measurements:
-    """Return the rows of all parts below each other.
-
-    Args:
-        parts: the first one names the whole.
-        warm: temperature of those that state none [°C].
-        bad: gears that are not among them, in addition to those of the parts.
-    """
-    blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
-    frames = [part.frame for part in parts]
-    names = dict.fromkeys(name for frame in frames for name in frame)
-    kept = [n for n in names if n in blank or all(n in frame for frame in frames)]
-    frames = [
-        frame.assign(**{n: blank[n] for n in kept if n not in frame})[kept]
-        for frame in frames
-    ]
-    labels = dict.fromkeys(("specimen", "run"), str)
-    whole: Any = pd.concat([frame.astype(labels) for frame in frames])
-    left_out = {gear: why for part in parts for gear, why in part.left_out.items()}
-    hashes = "".join(part.sha256 for part in parts)
-    return replace(
-        parts[0],
-        frame=whole.astype(dict.fromkeys(labels, "category")),
-        sha256=hashlib.sha256(hashes.encode()).hexdigest(),
-        stated=frozenset().union(*(part.stated for part in parts)),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
-        left_out={**bad, **left_out},
-    )
 
 
 def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
@@ -189,7 +142,9 @@ def _why(first: Finding, folder: Path) -> Finding:
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
     """Yield differences of a gear file from that of all gears, but for sizes."""
-    mine, theirs = (dict(_flat(each.source)) for each in (one, other))
+    mine, theirs = (
+        pd.json_normalize(each.source).to_dict("records")[0] for each in (one, other)
+    )
     remedy = "Gears of one kind differ in their sizes only"
     keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
     keys = [key for key in keys if mine.get(key) != theirs.get(key)]
@@ -197,21 +152,10 @@ def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Find
         here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
         words = f"is {here}, and {there} in {base}"
         yield Finding(str(file), words, remedy, None, key)
-    priors = [
-        {n: (p.family, p.numbers) for n, p in g.priors.items()} for g in (one, other)
-    ]
-    if not keys and priors[0] != priors[1]:
+    # Materials of one name may stand in several files.
+    if not keys and one.priors["E0"].numbers != other.priors["E0"].numbers:
         words = f"its material is another one than in {base}"
         yield Finding(str(file), words, remedy, None, "gear.material")
-
-
-def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the entries of nested tables by their dotted keys."""
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
 
 
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:

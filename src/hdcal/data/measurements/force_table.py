@@ -28,7 +28,7 @@ def read_columns(
     Args:
         data: the file, or a table in memory.
         mapping: quantity -> header with its unit in brackets, or None.
-        findings: of the source; gets one for everything that is wrong.
+        findings: gets one for everything that is wrong.
         quantities: to look for.
         required: which of them must be there.
         fewest: rows that are needed.
@@ -49,10 +49,6 @@ def read_force(
     path: Any, columns: Mapping[str, str] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read time [s] and force [N] from a table without a deformation, (n,) each.
-
-    Args:
-        path: the file; other columns than time and force are not looked at.
-        columns: quantity -> header with its unit in brackets.
 
     Raises:
         InputError: holds everything that is wrong with the file.

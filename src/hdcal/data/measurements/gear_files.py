@@ -43,7 +43,7 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
         raise InputError([Finding(str(folder), words, remedy)])
     labels = [(file.parent.name if cases else file.stem).strip() for file in files]
     twice = [label for label, many in Counter(labels).items() if many > 1]
-    words, remedy = "is what several files are called after", "Rename all but one"
+    words, remedy = "is the name of several files", "Rename all but one"
     if twice:
         raise InputError(
             Finding(str(folder), f"{quoted(one)} {words}", remedy) for one in twice

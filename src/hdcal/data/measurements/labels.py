@@ -1,7 +1,7 @@
 """Labels of rows: the mounting of each, its lot, operator, rig and date."""
 
 from collections.abc import Mapping
-from itertools import compress
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -40,7 +40,8 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
     """Return the label of each row's run; None where nothing tells runs apart.
 
     Without a column `run`, rows of a gear on another day or rig, or by another
-    operator, are of another mounting.
+    operator, are of another mounting. An empty cell is that of the row of the same gear
+    above it, or else below it.
 
     Args:
         values: by quantity, of each row, shape (n,).
@@ -51,50 +52,22 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
         return None
     if "date" in stated:
         stated["date"] = days_of(stated["date"])
-    table = pd.DataFrame({"gear": gear} | stated)
-    index = table.groupby([*table], sort=False).ngroup()
-    of_gears: dict[int, tuple[list, list]] = {}
-    pairs = []
-    for one, *cells in table.drop_duplicates().itertuples(index=False):
-        pairs.append((one, _mounting(*of_gears.setdefault(one, ([], [])), cells)))
-    known = [whole for whole, _ in of_gears.values()]
-    # Not what was the same for all mountings of each gear.
-    telling = [
-        any(len({cells[at] for cells in of} - {NOT_STATED}) > 1 for of in known)
-        for at in range(len(stated))
-    ]
-    if not any(telling):
+    cells = pd.DataFrame(stated, dtype=object)
+    cells = cells.mask(cells == NOT_STATED)
+    cells = cells.groupby(gear).ffill().groupby(gear).bfill().fillna(NOT_STATED)
+    several = cells.groupby(gear).nunique().gt(1).any()
+    # Not what is the same for all mountings of each gear.
+    telling = cells.columns[several]
+    if telling.empty:
         return None
+    table = cells[telling].assign(gear=gear)
+    index = table.groupby([*table], sort=False).ngroup().to_numpy()
+    each = table.drop_duplicates()
+    labels = each[telling].agg(" ".join, axis=1)
     # No two mountings of a gear have the same label.
-    taken: dict[tuple, list[str]] = {}
-    labels = []
-    for one, cells in pairs:
-        label = name = " ".join(compress(cells, telling))
-        count = 1
-        while taken.setdefault((one, label), cells) is not cells:
-            count += 1
-            label = f"{name} ({count})"
-        labels.append(label)
-    return np.array(labels, object)[index]
-
-
-def _mounting(known: list, loose: list, cells: list[str]) -> list[str]:
-    """Return the mounting of a gear that cells state; a new one is added to the known.
-
-    An empty cell states none: of those that the others fit it is the latest. Loose are
-    the known mountings that began with an empty cell.
-    """
-    empty = NOT_STATED in cells
-    # Without an empty cell on either side nothing fits.
-    for mounting in reversed(known if empty else loose):
-        pairs = [*zip(mounting, cells, strict=True)]
-        if all(one == other or NOT_STATED in (one, other) for one, other in pairs):
-            mounting[:] = [b if a == NOT_STATED else a for a, b in pairs]
-            return mounting
-    known.append(cells)
-    if empty:
-        loose.append(cells)
-    return cells
+    count = labels.groupby([each["gear"], labels]).cumcount()
+    names = [f"{n} ({k + 1})" if k else n for n, k in zip(labels, count, strict=True)]
+    return np.array(names, object)[index]
 
 
 def further_labels(
@@ -105,13 +78,6 @@ def further_labels(
     runs: tuple[str, ...],
 ) -> tuple[dict[str, tuple[str, ...]], list[str]]:
     """Return lots of gears, operators, rigs and dates of runs, as `Case` has them.
-
-    Args:
-        frame: of the rows.
-        gear: index of each row's, shape (n,).
-        gears: their names.
-        run: index of each row's, shape (n,).
-        runs: their names.
 
     Returns:
         The labels, and notes on those that are not used.
@@ -137,14 +103,12 @@ def _one_each(
     """
     if quantity not in frame:
         return (), ""
-    stated: dict[int, set[str]] = {}
     labels = frame[quantity].astype(str).to_numpy()
-    for one, label in dict.fromkeys(zip(index.tolist(), labels, strict=True)):
-        stated.setdefault(one, set()).add(label)
-    for one, several in stated.items():
-        several.discard(NOT_STATED)
-        if len(several) > 1:
-            word = "specimen" if quantity == "lot" else "run"
-            name = quoted(names[one])
-            return (), f"{quantity}s are not used: {word} {name} has several"
-    return tuple(next(iter(stated[one]), NOT_STATED) for one in sorted(stated)), ""
+    each: Any = pd.DataFrame({"of": index, "label": labels}).drop_duplicates()
+    each = each[each["label"] != NOT_STATED]
+    if (several := each["of"].duplicated()).any():
+        word = "specimen" if quantity == "lot" else "run"
+        name = quoted(names[each["of"][several].min()])
+        return (), f"{quantity}s are not used: {word} {name} has several"
+    stated = dict(zip(each["of"], each["label"], strict=True))
+    return tuple(stated.get(one, NOT_STATED) for one in range(len(names))), ""

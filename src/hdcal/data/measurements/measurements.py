@@ -21,9 +21,14 @@ from hdcal.data.measurements.checks import (
 from hdcal.data.measurements.labels import mountings, run_labels
 from hdcal.data.measurements.notes import ASSUMED, source_notes
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
+from hdcal.data.tables.columns import (
+    REQUIRED,
+    Column,
+    as_named,
+    choose_columns,
+    in_place_of_force,
+)
 from hdcal.data.tables.headers import QUANTITIES
-from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
@@ -35,18 +40,19 @@ _LISTED = 20
 
 @dataclass(frozen=True)
 class Measurements:
-    """What was measured, in the order it was taken.
+    """Readings in the order in which they were taken.
 
     Attributes:
-        frame: by quantity, in code units, indexed by the row of the source. Always
-            there are deformation, force, and the labels `specimen` and `run`, "1" and
-            "" where nothing is stated; `zero` counts the jumps of a zero before a row.
+        frame: columns by quantity, in code units, indexed by the row of the source.
+            There always are deformation, force, and the labels `specimen` and `run`,
+            "1" and "" where nothing is stated; `zero` counts the jumps of a zero
+            before a row.
         file: name of the source in findings.
         sha256: hash of the source.
         stated: quantities that the source states.
         named: quantity -> header with its unit, of headers that are not hdcal's own.
-        notes: what was assumed.
-        left_out: gears that are not among them, each with its fault.
+        notes: assumptions.
+        left_out: gears that were left out, each with its fault.
         units: names and units of force and deformation; of a torsional spring they
             are a torque and an angle.
     """
@@ -108,16 +114,18 @@ def read_measurements(
         data: the file, or a table in memory (see `read_source`).
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
-        encoding: of the text; by default the likeliest.
-        sheet: of a workbook; by default the one with readings.
-        gear: whose radius bounds the deformations; None where it is not known.
-        skip_bad: leave out gears with a faulty row, whole; False: refuse them, and
-            say that this can be asked for.
+        encoding: encoding of a text; by default the likeliest.
+        sheet: sheet of a workbook; by default the one with readings.
+        gear: whose radius bounds the deformations; None where it is unknown.
+        skip_bad: True leaves out gears with a faulty row, whole; False refuses them
+            and mentions this option.
 
     Raises:
         InputError: holds everything that is wrong with the source.
     """
-    with FileFindings(source_name(data)) as findings:
+    name = source_name(data)
+    name = name if sheet is None else f"{name}, sheet {quoted(sheet)}"
+    with FileFindings(name) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
         chosen = choose_columns(table, mapping or {}, QUANTITIES, REQUIRED, findings)
         used = in_place_of_force(chosen)
@@ -138,23 +146,22 @@ def measured_in(
     skip_bad: bool | None = None,
     whole: bool = True,
 ) -> Measurements:
-    """Return the measurements in the columns of a table, with notes on cells alone.
+    """Return the measurements in the columns of a table.
 
-    Gears that are left out count as if they had never been in the file: what is guessed
-    of cells, such as their decimal sign, is guessed of all the others.
+    Gears that are left out have no influence on the others: the decimal sign of cells,
+    for example, is judged by the others alone.
 
     Args:
         table: the readings.
         used: columns by quantity.
-        findings: of the source; gets what is wrong with the rows that count.
-        gear: as in `read_measurements`.
-        skip_bad: likewise.
+        findings: gets what is wrong with the rows that count.
+        gear: as in `read_measurements`, and so is `skip_bad`.
+        skip_bad: whether to leave out bad gears.
         whole: whether these are all rows of the source.
     """
     left_out: dict[str, Finding] = {}
     while True:
         wrong = FileFindings(findings.file)
-        wrong.places = findings.places
         read = _measured(table, used, wrong, gear, whole=whole)
         gears = read["specimen"] if wrong.rows else []
         bad = bad_gears(wrong, table.rows, gears)
@@ -178,7 +185,7 @@ def _measured(
     *,
     whole: bool,
 ) -> Measurements:
-    """Return the measurements in columns, right or wrong: the findings say."""
+    """Return the measurements in columns; faulty cells are NaN and have findings."""
     values, notes = read_values(table, used, findings)
     if table.runs is not None and "run" not in used:
         values["run"] = np.char.mod("%d", table.runs + 1).astype(object)
@@ -197,44 +204,43 @@ def _measured(
     force = used.get("force")
     units = TORQUE if force is not None and force.quantity == "torque" else FORCE
     read = Measurements(frame, findings.file, stated=stated, units=units)
-    read, note = _with_time(read, used, findings)
+    if "time" in frame:
+        read = _with_time(read, used["time"], findings)
     if gear is not None and "deformation" in used:
         check_reach(frame, used["deformation"], gear, findings)
-    return replace(read, notes=(*note, *(f"{ASSUMED}{one}" for one in notes)))
+    return replace(read, notes=(*read.notes, *(f"{ASSUMED}{note}" for note in notes)))
 
 
 def _with_time(
-    read: Measurements, used: Mapping[str, Column], findings: FileFindings
-) -> tuple[Measurements, list[str]]:
+    read: Measurements, column: Column, findings: FileFindings
+) -> Measurements:
     """Return measurements with a time that never goes back within a run, or without.
 
-    A time that goes back is refused where the user names it, or a header `time_UNIT`,
-    and not used where its header was guessed. A note says so.
+    A time that goes back is refused where the user names it, or a header `time_UNIT`;
+    it is not used, with a note, where its header was guessed.
     """
-    if "time" not in read.frame:
-        return read, []
     index, names = read.runs
     back = rows_back_in_time(read["time"], index)
     if not back.any():
-        return read, []
+        return read
     label = quoted(names[index[int(np.argmax(back))]])
     words = f"the time goes back within {f'run {label}' if len(names) > 1 else 'a run'}"
-    header, rows = used["time"].header, read.frame.index[back].tolist()
-    if not used["time"].guessed:
+    rows = read.frame.index[back].tolist()
+    if not column.guessed:
         remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
-        findings.add_rows(((row, words, remedy) for row in rows), header)
-        return read, []
-    note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {row_list(rows)}. If "
-    note += "the rig was reset there, label the runs in a column 'run'"
+        findings.add_rows(((row, words, remedy) for row in rows), column.header)
+        return read
+    note = f"{ASSUMED}{quoted(column.header)} is not used: {words}, at {row_list(rows)}"
+    note += ". If the rig was reset there, label the runs in a column 'run'"
     frame = read.frame.drop(columns="time")
-    return replace(read, frame=frame, stated=read.stated - {"time"}), [note]
+    return replace(read, frame=frame, stated=read.stated - {"time"}, notes=(note,))
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
-    """Return what was measured on one of several specimens.
+    """Return the measurements of one specimen.
 
     Raises:
-        InputError: none is called so, or it has too few rows, or was not moved.
+        InputError: there is no such specimen, it has too few rows, or it was not moved.
     """
     findings, (_, names) = FileFindings(measured.file), measured.gears
     name = quoted(label)

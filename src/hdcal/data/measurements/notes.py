@@ -9,10 +9,10 @@ from hdcal.data.loading import Motion
 from hdcal.data.measurements.labels import TELLING
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import LABELS, parse_header
-from hdcal.data.tables.named_columns import Column
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import quoted
+from hdcal.errors import quoted, shortened
 from hdcal.quantities import Quantities
 
 # First word of a note on what was assumed.
@@ -71,8 +71,6 @@ def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[st
             )
     if extra:
         yield f"columns not used: {', '.join(map(quoted, extra))}"
-    if table.skipped:
-        yield f"{table.skipped} empty lines between the readings were skipped"
 
 
 def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
@@ -91,25 +89,22 @@ def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
 
 def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
     """Yield that temperatures [°C], shape (n,), are those of no rig."""
-    if temperature is None:
-        return
     low, high = _USUAL
-    if not low <= (typical := np.median(temperature)) <= high:
+    if temperature is not None and not low <= np.median(temperature) <= high:
         yield (
-            f"temperatures about {typical:.4g} °C are far from those of any "
-            "rig. Check the unit of the column"
+            f"temperatures about {np.median(temperature):.4g} °C are far from those of "
+            "any rig. Check the unit of the column"
         )
 
 
 def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator[str]:
     """Yield that the deformation was reset; rows are the names of rows, shape (n,)."""
     if motion.resets:
-        few = ", ".join(str(rows[row]) for row in motion.resets[:_MOST_ROWS])
-        few += ", …" if len(motion.resets) > _MOST_ROWS else ""
+        few = shortened(rows[[*motion.resets]].tolist(), _MOST_ROWS)
         yield (
             f"the {units.displacement} goes back over most of its range in one step "
-            f"(row {few}), which counts as no measured "
-            "unloading. Where a new mounting begins there, say so in a column `run`"
+            f"(row {few}), which counts as no measured unloading. Where a new mounting "
+            "begins there, say so in a column `run`"
         )
 
 
@@ -122,8 +117,7 @@ def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[st
     yield (
         f"{ASSUMED}without a column `run`, rows of a gear that differ in {differ} are "
         f"of different mountings: {runs} mountings of {gears} "
-        f"gear{'s' if gears > 1 else ''}. "
-        "If not, name the mountings in a column `run`"
+        f"gear{'s' if gears > 1 else ''}. If not, name the mountings in a column `run`"
     )
 
 

@@ -16,12 +16,22 @@ from hdcal.data.measurements.measurements import Measurements, measured_in
 from hdcal.data.measurements.notes import source_notes
 from hdcal.data.measurements.screened import asked_range
 from hdcal.data.reading import gear_of
-from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
+from hdcal.data.tables.columns import (
+    REQUIRED,
+    Column,
+    as_named,
+    choose_columns,
+    in_place_of_force,
+)
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.tables.named_columns import Column, as_named
-from hdcal.data.tables.parquet_files import parquet_files, parquet_table
+from hdcal.data.tables.parquet_files import (
+    frame_of,
+    parquet_files,
+    parquet_table,
+    plain_columns,
+)
 from hdcal.data.tables.shapes import table_of
 
 if TYPE_CHECKING:
@@ -39,11 +49,11 @@ class Parquet:
     """Files that are read in batches.
 
     Attributes:
-        name: of the file, or of the folder.
+        name: name of the file or folder.
         gear: common to all gears.
         files: in their order.
-        root: of their folder; empty where there is one file.
-        schema: of all files.
+        root: their folder; empty where there is one file.
+        schema: columns of all files.
         used: columns by quantity.
         named: as in `Measurements`.
         notes: what was assumed.
@@ -82,15 +92,6 @@ def open_parquet(
 ) -> Parquet:
     """Look into a Parquet file, or a folder of them, partitioned or not.
 
-    Args:
-        data: the file, or the folder.
-        gear: as in `read_case`; by default the gear.toml beside the file, or in the
-            folder.
-        columns: as in `read_case`, and so are all that follow.
-        theory: overrides the gear file's.
-        reading: of the deformation.
-        range: working range.
-
     Raises:
         InputError: holds everything that is wrong with its columns.
     """
@@ -101,11 +102,10 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        common, notes = gear_of(gear, nearby, False, (theory, None, reading))
+        common, notes = gear_of(gear, nearby, False, (theory, reading))
         named = {**common.source.get("columns", {}), **(columns or {})}
-        first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
-        grid = arrow_grid(first.schema, first.column, first.num_rows, 2)
-        table = table_of(grid, findings)
+        first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
+        table = table_of(frame_grid(frame_of(first)), findings)
         chosen = choose_columns(table, named, _USED, REQUIRED, findings)
         used = in_place_of_force(chosen)
         if "specimen" not in used:
@@ -124,13 +124,6 @@ def open_parquet(
     )
 
 
-def _plain(schema: "Schema") -> list[str]:
-    """Return the columns that hold plain cells."""
-    from pyarrow import types
-
-    return [one.name for one in schema if not types.is_nested(one.type)]
-
-
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
@@ -141,13 +134,19 @@ def read_batches(
     """
     with FileFindings(file) as findings:
         dataset = parquet_table([file], source.root, findings)
-    dataset, names = dataset.replace_schema(source.schema), _plain(source.schema)
+    dataset = dataset.replace_schema(source.schema)
+    names = plain_columns(source.schema)
     headers = [names[column.position] for column in source.used.values()]
     places = {q: place for place, q in enumerate(source.used)}
     used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
-            grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
+            frame = frame_of(rows)
+            # Times would be as many labels as rows: of dates the day counts.
+            for name in frame.select_dtypes(["datetime", "datetimetz"]):
+                days = frame[name].dt.tz_localize(None).dt.normalize()
+                frame[name] = days.astype("category")
+            grid = frame_grid(frame, first)
             table = ReadTable(tuple(headers), first, grid, rows.num_rows)
             how: dict = {"skip_bad": skip_bad, "whole": False}
             read = measured_in(table, used, findings, source.gear, **how)

@@ -1,14 +1,15 @@
-"""Measurements after their screening: rows cut, zeros moved back."""
+"""Measurements after their screening: rows cut, zeros moved back, scatter removed."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import make_smoothing_spline
 
 from hdcal.data.measurements.bad_gears import among, offer
 from hdcal.data.measurements.checks import FEWEST_ROWS
-from hdcal.data.measurements.deformation_scatter import without_scatter
 from hdcal.data.measurements.measurements import Measurements
+from hdcal.data.records import less_run_means
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
@@ -60,8 +61,7 @@ def screened(
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
     units = measured.units
-    time = measured.get("time")
-    result = screen(x, measured["force"], time, run, whole=whole, wanted=wanted)
+    result = screen(x, measured["force"], run, whole=whole, wanted=wanted)
     if result.asked:
         left = _without_asked(measured, result, skip_bad, whole=whole)
         return screened(left, wanted, whole=whole)
@@ -86,9 +86,7 @@ def screened(
         remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
         raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
-    columns = ("deformation", "force", "zero", "time")
-    moved = {name: getattr(result, name) for name in columns}
-    moved = {name: values for name, values in moved.items() if values is not None}
+    moved = {name: getattr(result, name) for name in ("deformation", "force", "zero")}
     left = measured.assign(**moved).where(result.kept)
     return _without_scatter(left, run[result.kept], result), result
 
@@ -116,13 +114,30 @@ def _without_asked(
 def _without_scatter(
     measured: Measurements, run: np.ndarray, result: Screening
 ) -> Measurements:
-    """Return the kept rows without the scatter of the deformation, where it shows."""
+    """Return the kept rows without the scatter of the deformation, where it shows.
+
+    Scatter in the deformation makes a fitted slope too small by the share that it has
+    in the variance of the deformation (regression dilution). The deformation smoothed
+    over the rows is an instrument (two-stage least squares): each reading moves
+    parallel to the line to its smoothed deformation. Its distance from the line stays,
+    so that the interval of the slope counts the scatter.
+    """
     x, force = measured["deformation"].copy(), measured["force"].copy()
     shaken = {o.run for o in result.observations if o.action == "smoothed"}
     for index in shaken:
         rows = np.flatnonzero(run == index)
         zero = measured["zero"][rows]
-        x[rows], force[rows] = without_scatter(x[rows], force[rows], zero)
+        smooth = x[rows].copy()
+        for label in np.unique(zero):
+            part = zero == label
+            # SciPy makes no spline of fewer rows.
+            if part.sum() >= FEWEST_ROWS:
+                order = np.arange(part.sum(), dtype=float)
+                smooth[part] = make_smoothing_spline(order, x[rows][part])(order)
+        place, height = (less_run_means(each, zero) for each in (smooth, force[rows]))
+        slope = float(place @ height) / float(place @ place)
+        force[rows] += slope * (smooth - x[rows])
+        x[rows] = smooth
     return measured.assign(deformation=x, force=force) if shaken else measured
 
 

@@ -33,7 +33,6 @@ class ReadTable:
         conflicts: unit that a row of units states against a header, by position.
         unit_row: that row.
         empty: positions of columns without any cell.
-        skipped: number of empty lines between the readings.
         notes: what was assumed.
         left_out: what was not read.
         runs: number of the run of each row by repeated headers, shape (n,); None
@@ -48,7 +47,6 @@ class ReadTable:
     conflicts: Mapping[int, str] = field(default_factory=dict)
     unit_row: int | None = None
     empty: frozenset[int] = frozenset()
-    skipped: int = 0
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     runs: np.ndarray | None = None
@@ -106,18 +104,7 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
     table = _joined(readings, headings, empty, others, findings)
     findings.add_rows(others.faults)
     filled = len(readings.rows) + len(others.faults)
-    table = replace(table, filled=filled, skipped=_skipped(readings.rows, grid))
-    return table, headings[0].titles
-
-
-def _skipped(readings: np.ndarray, grid: Grid) -> int:
-    """Return the number of empty lines between the first and the last reading."""
-    if not len(readings):
-        return 0
-    first, last = readings[0], readings[-1]
-    filled = np.sum((grid.rows >= first) & (grid.rows <= last))
-    filled += sum(first < line.row < last for line in grid.loose)
-    return int(last - first + 1 - filled)
+    return replace(table, filled=filled), headings[0].titles
 
 
 def _sample(grid: Grid) -> Grid:
@@ -190,7 +177,7 @@ def _joined(
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
     orders = [_order(heading, main) for heading in headings]
     foreign = [h.row for h, order in zip(headings, orders, strict=True) if not order]
-    words = "the columns are others than those of the first block"
+    words = "the columns differ from those of the first block"
     remedy = "Name them alike, or split the file"
     findings.add_rows((row, words, remedy) for row in foreign)
     usual = [*range(grid.width)]
@@ -231,11 +218,8 @@ def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> G
     """Return a grid with the columns of some blocks in the order of the first."""
     columns = grid.read(range(grid.width))
     spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
-
-    def load(place: int) -> np.ndarray:
-        column = columns[place].astype(object)
-        for number, (begin, end) in spans.items():
-            column[begin:end] = columns[orders[number][place]][begin:end]
-        return column
-
-    return ArrayGrid(grid.rows, grid.width, [], load)
+    moved = [columns[place].astype(object) for place in range(grid.width)]
+    for number, (begin, end) in spans.items():
+        for place, other in enumerate(orders[number]):
+            moved[place][begin:end] = columns[other][begin:end]
+    return ArrayGrid(grid.rows, grid.width, [], moved)

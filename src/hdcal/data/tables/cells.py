@@ -15,7 +15,6 @@ _WITH_UNIT = re.compile(rf"([+-]?[\d.,eE+-]+)\s*({_UNITS})")
 # Whole numbers whose thousands are marked by points; by commas, at least once.
 _POINTED = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
-_ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 # Label of a row whose source states none.
 NOT_STATED = "not stated"
 # Index, problem and remedy of a cell.
@@ -46,9 +45,6 @@ def read_number(cell: str, comma: bool) -> float:
     if not cell:
         raise CellError("the cell is empty", "Fill it in or leave out the row")
     cell = cell.removesuffix(unit_in(cell)).rstrip()
-    if _ENDLESS.fullmatch(cell):
-        remedy = "Leave out the row if nothing was read"
-        raise CellError(f"'{cell}' is not a finite number", remedy)
     digits, point = any(map(str.isdigit, cell)), cell
     if comma and "." not in cell:
         point = cell.replace(",", ".")
@@ -60,8 +56,7 @@ def read_number(cell: str, comma: bool) -> float:
         if digits:
             remedy = "Write a plain number with a point, and no sign for thousands"
         raise CellError(f"'{cell}' is not a number", remedy)
-    number = float(point)
-    if math.isinf(number):
+    if math.isinf(number := float(point)):
         raise CellError(f"'{cell}' is too large for a finite number", "Check the cell")
     return number
 
@@ -71,9 +66,6 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
 
     One decimal mark serves a whole source, that of most cells. Beside numbers that are
     stored as such, commas that may all mark thousands do not count.
-
-    Args:
-        columns: objects, shape (n,) each, texts or numbers.
     """
     cells = [cell for column in columns for cell in column.tolist()]
     texts = [cell for cell in cells if isinstance(cell, str) and NUMBER.match(cell)]
@@ -88,23 +80,16 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
 def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault]]:
     """Read a column that is no plain array of numbers.
 
-    Args:
-        cells: texts without blanks around them, or numbers, shape (n,).
-        comma: whether texts have decimal commas.
-
     Returns:
         Floats, NaN where a cell is wrong, shape (n,); and the faults.
     """
     numbers, faults = np.full(len(cells), np.nan), []
     for index, cell in enumerate(cells.tolist()):
         try:
-            numbers[index] = (
-                cell
-                if isinstance(cell, float | int)
-                and not isinstance(cell, bool)
-                and math.isfinite(cell)
-                else read_number(str(cell), comma)
-            )
+            if type(cell) in (float, int) and math.isfinite(cell):
+                numbers[index] = cell
+            else:
+                numbers[index] = read_number(str(cell), comma)
         except CellError as error:
             faults.append((index, *error.args))
     return numbers, faults

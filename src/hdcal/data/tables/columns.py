@@ -5,6 +5,7 @@ a unit is missing, that is asked; nothing is guessed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
+    DIMENSIONS,
     GROUPINGS,
     LABELS,
     QUANTITIES,
@@ -20,7 +22,7 @@ from hdcal.data.tables.headers import (
     unit_advice,
     weight_unit,
 )
-from hdcal.data.tables.named_columns import Column, named_column
+from hdcal.data.units import Unit, find_unit
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
@@ -28,6 +30,27 @@ REQUIRED = ("deformation", "force")
 _TURNING = ("angle", "torque")
 # Columns that are listed where the user has to choose.
 _SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that is used.
+
+    Attributes:
+        quantity: one of QUANTITIES.
+        header: as written in the file.
+        position: 0 = first column.
+        unit: unit of its numbers; None for labels.
+        guessed: its header is not spelt `quantity_unit`.
+        against: another unit, which its header names itself.
+    """
+
+    quantity: str
+    header: str
+    position: int
+    unit: Unit | None = None
+    guessed: bool = False
+    against: str = ""
 
 
 def choose_columns(
@@ -68,7 +91,7 @@ def choose_columns(
         required = _TURNING if turning else required
     for quantity in quantities:
         if quantity in mapping:
-            column = named_column(quantity, mapping[quantity], table, findings)
+            column = chooser.named(quantity, mapping[quantity])
         elif quantity in LABELS:
             column = chooser.label(quantity)
         else:
@@ -85,6 +108,24 @@ def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
         return dict(used)
     names = {"angle": "deformation", "torque": "force"}
     return {names.get(quantity, quantity): column for quantity, column in used.items()}
+
+
+def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
+    """Return how a user would name each column: its header or number, with its unit.
+
+    Columns with hdcal's own headers need no other name.
+    """
+    named = {}
+    for column in used.values():
+        quantity, header = column.quantity, parse_header(column.header)
+        if header.exact and header.quantity == quantity and not column.against:
+            continue
+        alone = table.headers.count(column.header) == 1
+        name = column.header if alone else str(column.position + 1)
+        enough = alone and header.unit == column.unit
+        unit = "" if column.unit is None else column.unit.name
+        named[quantity] = name if enough or not unit else f"{name}[{unit}]"
+    return named
 
 
 def _check_names(
@@ -105,11 +146,44 @@ def _check_names(
 
 
 class _Chooser:
-    """Choice by headers."""
+    """Choice of one column after the other; what is wrong is added to the findings."""
 
     def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings
         self._headers = [*map(parse_header, table.headers)]
+
+    def named(self, quantity: str, wanted: str) -> Column | None:
+        """Return the column that a user named: 'Load [kN]', 'Load[kN]' or '2[kN]'."""
+        headers, add = self._table.headers, self._findings.add
+        name, unit_text = _split_brackets(wanted)
+        places, option = _places(wanted, name, headers), f"`columns` {quantity}="
+        if len(places) != 1:
+            words = f"{option}{wanted} names a column that is not there"
+            near = get_close_matches(name, headers, 1, 0.4)
+            remedy = f"Use a header of the file, such as '{near[0]}'" if near else ""
+            remedy = remedy or "Use one of: " + ", ".join(headers[:_SHOWN])
+            if places:
+                words = f"{option}{wanted} fits {len(places)} columns"
+                numbers = " or ".join(str(place + 1) for place in places)
+                remedy = f"Name it by its number, {numbers}"
+            add(words, remedy, self._table.header_row, name)
+            return None
+        header, parsed = headers[places[0]], self._headers[places[0]]
+        if quantity in LABELS:
+            return Column(quantity, header, places[0])
+        in_header = parsed.unit or find_unit(header.rpartition("_")[2])
+        unit = in_header if unit_text is None else find_unit(unit_text)
+        if unit is None or unit.dimension != DIMENSIONS[quantity]:
+            text = parsed.unit_text if unit_text is None else unit_text
+            words = f"has no unit that is known for {quantity}"
+            words = f"unknown unit '{text}' for {quantity}" if text else words
+            remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
+            add(words, remedy, self._table.header_row, header)
+            return None
+        against = ""
+        if in_header not in (None, unit) and in_header.dimension == unit.dimension:
+            against = in_header.name
+        return Column(quantity, header, places[0], unit, against=against)
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
         """Return the only column of a quantity; more than one is asked about."""
@@ -235,6 +309,30 @@ class _Chooser:
                 remedy += f"{place + 1}[{unit}]'"
                 break
         self._findings.add(words, remedy, self._table.header_row, quantity)
+
+
+def _places(wanted: str, name: str, headers: tuple[str, ...]) -> list[int]:
+    """Return the places of the columns that a text may name."""
+
+    def called(names: set[str], texts: Sequence[str]) -> list[int]:
+        return [i for i, text in enumerate(texts) if "".join(text.split()) in names]
+
+    # A header may itself end in brackets, so the whole text is tried as well.
+    places = called({"".join(text.split()) for text in (wanted, name)}, headers)
+    bare = [_split_brackets(header)[0] for header in headers]
+    places = places or called({"".join(name.split())}, bare)
+    if not places and name.isdigit() and 0 < int(name) <= len(headers):
+        return [int(name) - 1]
+    return places
+
+
+def _split_brackets(text: str) -> tuple[str, str | None]:
+    """`Load [kgf]` -> (`Load`, `kgf`); no unit where the text ends in no brackets."""
+    text = text.strip()
+    name, opening, unit = text.removesuffix("]").rpartition("[")
+    if not (opening and text.endswith("]")) or "]" in unit:
+        return text, None
+    return name.rstrip(), unit.strip()
 
 
 def _refuse_conflicts(

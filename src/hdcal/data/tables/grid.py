@@ -2,26 +2,26 @@
 
 import csv
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+import pandas as pd
 
 from hdcal.data.tables.cells import is_number
 
 SEPARATORS = "\t;|,"
-T = TypeVar("T")
 
 
 class SourceLine(NamedTuple):
     """A row of a source that is no reading, or not yet known to be one.
 
     Attributes:
-        row: of the source, 1 = first.
+        row: its number in the source, 1 = first.
         cells: texts without blanks around them.
         fits: whether it is a row of the grid, as readings are.
     """
@@ -69,17 +69,17 @@ class Grid(ABC):
         """
 
     @abstractmethod
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """Return the index of each cell, shape (n,), and the texts in a column."""
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
 
     @abstractmethod
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
 
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
-        index, texts = self.labels(column)
-        return np.array(texts, object)[index].tolist()
+    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+        """Return the index of each cell, shape (n,), and the texts in a column."""
+        index, texts = pd.factorize(np.array(self.texts(column), object))
+        return index, texts.tolist()
 
     def is_numeric(self, column: int) -> bool:
         """Tell whether the source itself states that a column holds only numbers."""
@@ -103,7 +103,7 @@ class TextGrid(Grid):
     """Lines of a text with as many cells each.
 
     Attributes:
-        separator: of the cells.
+        separator: character between cells.
         text: the lines.
         quoted: some cells stand in quotation marks.
     """
@@ -130,10 +130,6 @@ class TextGrid(Grid):
         if self.quoted:
             return [split_line(line, mark)[column] for line in self.text]
         return [line.split(mark, column + 1)[column].strip() for line in self.text]
-
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """Return the index of each cell, shape (n,), and the texts in a column."""
-        return factorize(self.texts(column))
 
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
@@ -177,40 +173,39 @@ class TextGrid(Grid):
 
 @dataclass(frozen=True)
 class ArrayGrid(Grid):
-    """Columns of arrays, each loaded when it is needed.
+    """Columns of arrays.
 
     Attributes:
-        load: returns a column, numbers or objects.
-        numeric: positions of the columns that are stored as numbers.
-        index: which of the loaded rows these are, shape (n,); None of all.
+        columns: numbers or objects, shape (n,) each.
     """
 
-    load: Callable[[int], np.ndarray]
-    numeric: frozenset[int] = frozenset()
-    index: np.ndarray | None = None
+    columns: Sequence[np.ndarray]
 
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
         """Return columns by position, shape (n,) each; see `Grid`."""
         return {place: self._column(place) for place in columns}
 
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
+        index, texts = self.labels(column)
+        return np.array(texts, object)[index].tolist()
+
     def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
         """Return the index of each cell, shape (n,), and the texts in a column."""
-        index, cells = factorize(self._column(column).tolist())
-        return index, [*map(stored_text, cells)]
+        index, cells = pd.factorize(self._column(column))
+        return index, [*map(stored_text, cells.tolist())]
 
     def take(self, chosen: np.ndarray) -> Self:
         """Return the rows where a mask, shape (n,), is true; none of them is loose."""
-        index = np.flatnonzero(chosen)
-        index = index if self.index is None else self.index[index]
-        return replace(self, rows=self.rows[chosen], index=index, loose=[])
+        columns = [column[chosen] for column in self.columns]
+        return replace(self, rows=self.rows[chosen], columns=columns, loose=[])
 
     def is_numeric(self, column: int) -> bool:
         """Tell whether the source itself states that a column holds only numbers."""
-        return column in self.numeric
+        return self.columns[column].dtype != object
 
     def _column(self, place: int) -> np.ndarray:
-        cells = self.load(place)
-        cells = cells if self.index is None else cells[self.index]
+        cells = self.columns[place]
         stored = cells.dtype != object
         if not stored and not all(isinstance(c, float | int) for c in cells.tolist()):
             return cells
@@ -221,12 +216,6 @@ class ArrayGrid(Grid):
             cells = floats.astype(object)
             cells[np.isnan(floats)] = ""
         return cells
-
-
-def factorize(labels: Sequence[T]) -> tuple[np.ndarray, list[T]]:
-    """Return the index of each label, shape (n,), and labels in order of appearance."""
-    names = {label: index for index, label in enumerate(dict.fromkeys(labels))}
-    return np.fromiter((names[one] for one in labels), int, len(labels)), [*names]
 
 
 def stored_text(cell: Any) -> str:

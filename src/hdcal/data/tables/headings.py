@@ -24,9 +24,9 @@ class Heading(NamedTuple):
         names: with their units in brackets, shape (c,).
         bare: the names as written, shape (c,).
         titles: cells of the line above the names, shape (c,).
-        row: of the names in the source; 0 where there are none.
+        row: row of the names in the source; 0 where there are none.
         last: row of the last of names and units.
-        unit_row: of the units; None without one.
+        unit_row: row of the units; None without one.
         cells: number of names.
         conflicts: other unit that the row of units states, by position.
     """

@@ -31,7 +31,7 @@ class OtherLines:
     Args:
         width: cells of a reading.
         counted: positions of the columns that hold numbers.
-        findings: of the source.
+        findings: findings on the source.
 
     Attributes:
         spoilt: rows of readings with a bad cell.
@@ -42,11 +42,9 @@ class OtherLines:
         self._width, self._counted, self._findings = width, counted, findings
         self.spoilt: list[int] = []
         self.faults: list[tuple[int, str, str]] = []
-        # Numbers of further headings above the first reading, and of lines above the
-        # headings, between blocks and below the readings.
-        self._repeated = self._above = self._titles = self._footers = 0
-        self._remarks: list[SourceLine] = []
-        self._other_tables: list[int] = []
+        # Numbers of further headings and of titles above the first reading.
+        self._repeated = self._above = 0
+        self._left: list[SourceLine] = []
 
     def sort_above(self, lines: list[SourceLine], heading: Heading | None) -> Heading:
         """Sort the lines above the first reading, and return the first heading.
@@ -90,20 +88,18 @@ class OtherLines:
             if self._is_spoilt(line, titled=titled):
                 self.spoilt.append(line.row)
             elif line.counts and not line.fits and len(line.cells) == words > 1:
-                others.append(line.row)
-            elif not _is_remark(line, titled=titled, below=below):
-                self._refuse(line, top=top)
-            elif titled or below:
-                self._titles += titled
-                self._footers += below
+                others.append(line)
+            elif _is_remark(line, titled=titled, below=below):
+                self._left.append(line)
             else:
-                self._remarks.append(line)
+                self._refuse(line, top=top)
             words = words if line.counts else len(line.cells)
         if len(others) >= _FEWEST:
             problem = "a second table with other columns begins here"
-            self.faults.append((others[0], problem, "Split the file: one table each"))
+            remedy = "Split the file: one table each"
+            self.faults.append((others[0].row, problem, remedy))
         else:
-            self._other_tables += others
+            self._left += others
 
     def _is_spoilt(self, line: SourceLine, *, titled: bool) -> bool:
         """Tell whether a line is a reading with a bad cell."""
@@ -128,30 +124,21 @@ class OtherLines:
 
     def left_out(self) -> Iterator[str]:
         """Yield notes on lines that are not read."""
-        if self._remarks:
-            rows = row_list([line.row for line in self._remarks])
-            yield f"no readings: {rows}, as {quoted(self._remarks[0].first)}"
-        if self._other_tables:
-            rows = row_list(self._other_tables)
-            yield f"a table of other columns is not read: {rows}"
+        if self._left:
+            rows = row_list(sorted(line.row for line in self._left))
+            yield f"no readings: {rows}, as {quoted(self._left[0].first)}"
 
     def assumed(self, heading: Heading, headings: int) -> Iterator[str]:
         """Yield notes on what was assumed."""
         if self._above:
             names = ", ".join(map(quoted, heading.names))
-            lines = _lines(self._above)
+            lines = "1 line" if self._above == 1 else f"{self._above} lines"
             yield f"{lines} above the table taken for titles. Its columns: {names}"
         if heading.unit_row is not None and heading.unit_row > heading.row:
-            row = self._findings.row_of_file(heading.unit_row)
-            yield f"row {row} taken for the units of the columns"
+            yield f"row {heading.unit_row} taken for the units of the columns"
         if headings + self._repeated > 1:
             times = headings + self._repeated
             yield f"the headers stand {times} times. If not, split the file"
-        if self._titles:
-            yield f"{_lines(self._titles)} between the blocks taken for their titles"
-        if self._footers:
-            lines = _lines(self._footers).removeprefix("1 ")
-            yield f"the last {lines} taken for no readings"
 
 
 def _is_open(line: SourceLine) -> bool:
@@ -166,7 +153,3 @@ def _is_remark(line: SourceLine, *, titled: bool, below: bool) -> bool:
     if line.counts or _is_open(line):
         return False
     return titled or (below and line.numbers < 2) or line.fits
-
-
-def _lines(count: int) -> str:
-    return "1 line" if count == 1 else f"{count} lines"

@@ -4,19 +4,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.grid import ArrayGrid
 from hdcal.data.tables.headers import parse_header
 from hdcal.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from pyarrow import Schema
+    from pyarrow import Schema, Table
     from pyarrow.dataset import Dataset
 
 # First bytes of a Parquet file.
 PARQUET = b"PAR1"
-_REMEDY = "Save it anew"
 # Tables of other kinds, of which a folder is a case.
 _OTHERS = {".csv", ".txt", ".tsv", ".xlsx", ".lvm", ".dat"}
 
@@ -71,35 +72,53 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(f"is no Parquet file that can be read ({error})", _REMEDY)
+        findings.refuse(
+            f"is no Parquet file that can be read ({error})", "Save it anew"
+        )
 
 
 def _joined(
     schemas: Sequence["Schema"], files: Sequence[str], findings: FileFindings
 ) -> "Schema":
-    """Return the columns of all files; one that has several kinds is refused."""
+    """Return the columns of all files; one that is read and has several is refused."""
     import pyarrow as arrow
 
-    fields: dict[str, list] = {}
-    for place, schema in enumerate(schemas):
-        for field in schema:
-            fields.setdefault(field.name, []).append((place, field))
     joined = []
-    for name, several in fields.items():
-        each = [arrow.schema([field]) for _, field in several]
+    for name in dict.fromkeys(name for schema in schemas for name in schema.names):
+        with_it = ((i, one) for i, one in enumerate(schemas) if name in one.names)
+        each = [(i, one.field(name)) for i, one in with_it]
         try:
             # A column that is empty in a file, or narrower, is no other kind.
-            schema = arrow.unify_schemas(each, promote_options="permissive")
+            several = [arrow.schema([field]) for _, field in each]
+            schema = arrow.unify_schemas(several, promote_options="permissive")
             joined.append(schema.field(0))
         except arrow.ArrowTypeError:
-            first = several[0][1].type
-            at, other = next((i, f.type) for i, f in several if f.type != first)
+            first = each[0][1].type
+            at, other = next((i, f.type) for i, f in each if f.type != first)
             words = f"{quoted(name)} is {other} in {files[at]}, {first} before"
             if parse_header(name).quantity:
-                findings.add(words, _REMEDY)
+                findings.add(words, "Save it anew")
     if findings:
         raise InputError(findings)
     return arrow.schema(joined)
+
+
+def plain_columns(schema: "Schema") -> list[str]:
+    """Return the columns that hold plain cells."""
+    from pyarrow import types
+
+    return [field.name for field in schema if not types.is_nested(field.type)]
+
+
+def frame_of(table: "Table") -> pd.DataFrame:
+    """Return a table of Arrow as a DataFrame, its texts as categories."""
+    from pyarrow import types
+
+    for place, field in enumerate(table.schema):
+        if types.is_string(field.type) or types.is_large_string(field.type):
+            coded = table.column(place).dictionary_encode()
+            table = table.set_column(place, field.name, coded)
+    return table.to_pandas()
 
 
 def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
@@ -109,8 +128,5 @@ def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
         InputError: it is none, or pyarrow is missing.
     """
     dataset = parquet_table([str(path)], "", findings)
-
-    def column(name: str) -> Any:
-        return dataset.to_table(columns=[name], use_threads=False).column(0)
-
-    return arrow_grid(dataset.schema, column, dataset.count_rows(), 2)
+    table = dataset.to_table(columns=plain_columns(dataset.schema), use_threads=False)
+    return frame_grid(frame_of(table))

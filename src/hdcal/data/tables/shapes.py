@@ -1,6 +1,6 @@
-"""Tables in other shapes: units in cells, specimens side by side or in sheets."""
+"""Tables in other shapes: units in cells, specimens side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,10 +32,9 @@ def _with_units(table: ReadTable, findings: FileFindings) -> ReadTable:
     headers, notes = [*table.headers], [*table.notes]
 
     def refuse(name: str, units: Sequence[str]) -> None:
-        words = (
-            f"the unit of {quoted(name)} changes: {' and '.join(map(quoted, units))}"
-        )
-        findings.add(words, "Convert the readings to one unit", table.header_row)
+        words = " and ".join(map(quoted, units))
+        problem = f"the unit of {quoted(name)} changes: {words}"
+        findings.add(problem, "Convert the readings to one unit", table.header_row)
 
     for place, name in enumerate(headers[:-1]):
         if headers[place + 1].strip().casefold() not in UNIT_LABELS:
@@ -62,29 +61,6 @@ def _with_units(table: ReadTable, findings: FileFindings) -> ReadTable:
     return replace(table, headers=tuple(headers), notes=tuple(notes))
 
 
-def _below_each_other(
-    rows: Sequence[np.ndarray],
-    columns: Sequence[Sequence[np.ndarray]],
-    names: Sequence[str],
-) -> ArrayGrid:
-    """Return a grid of several tables, with a last column that names each.
-
-    Args:
-        rows: of each table, shape (n,) each.
-        columns: of each table, shape (n,) each.
-        names: of the tables.
-    """
-    sizes, width = [*map(len, rows)], len(columns[0])
-    labels = np.repeat(np.array(names, object), sizes)
-
-    def load(place: int) -> np.ndarray:
-        if place == width:
-            return labels
-        return np.concatenate([each[place].astype(object) for each in columns])
-
-    return ArrayGrid(np.concatenate(rows), width + 1, [], load)
-
-
 def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
     """Return a table with each column once, where specimens stand side by side.
 
@@ -96,14 +72,16 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
     if not period or not all(headers) or len({*headers[:period]}) < period:
         return table
     cells = table.grid.read(range(width))
-    names, rows, columns = [], [], []
+    names, rows, blocks = [], [], []
     for start in range(0, width, period):
-        each = [cells[start + k] for k in range(period)]
-        filled = np.any([column != "" for column in each], axis=0)
+        each = np.array([cells[start + k] for k in range(period)], object)
+        filled = np.any(each != "", axis=0)
         names.append(titles[start] or str(start // period + 1))
         rows.append(table.rows[filled])
-        columns.append([column[filled] for column in each])
-    grid = _below_each_other(rows, columns, names)
+        label = np.full((1, filled.sum()), names[-1], object)
+        blocks.append(np.concatenate([each[:, filled], label]))
+    columns = np.concatenate(blocks, axis=1)
+    grid = ArrayGrid(np.concatenate(rows), period + 1, [], [*columns])
     note = f"{len(names)} specimens stand side by side: {', '.join(map(quoted, names))}"
     return replace(
         table,
@@ -113,42 +91,4 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
         empty=frozenset(),
         notes=(*table.notes, note),
         runs=None,
-    )
-
-
-def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> ReadTable:
-    """Return sheets below each other, with a column that names the sheet.
-
-    Raises:
-        InputError: their columns differ, or one of them names specimens itself.
-    """
-    first, tables = next(iter(grids)), {}
-    for name, grid in grids.items():
-        problems = FileFindings(f"{findings.file}, sheet {quoted(name)}")
-        table = tables[name] = table_of(grid, problems)
-        findings += problems
-        if not table.named:
-            findings.refuse(f"sheet {quoted(name)} has no row of headers", "Add one")
-        if "specimen" in table.headers:
-            words = f"sheet {quoted(name)} names specimens itself"
-            findings.refuse(words, "Name that sheet alone")
-        if table.headers != tables[first].headers:
-            words = f"sheets {quoted(first)} and {quoted(name)} have other columns"
-            findings.refuse(words, "Name one sheet, or give them the same headers")
-    headers, several = tables[first].headers, [*tables.values()]
-    columns = [[*t.grid.read(range(len(headers))).values()] for t in several]
-    grid = _below_each_other([t.rows for t in several], columns, [*tables])
-    begin = first, tables[first].header_row
-    places = [(name, int(row)) for name, t in tables.items() for row in t.rows]
-    findings.places = [begin, *places]
-    runs = [t.runs for t in several]
-    blocks = [np.zeros(len(t.rows), int) if t.runs is None else t.runs for t in several]
-    return ReadTable(
-        headers=(*headers, "specimen"),
-        header_row=1,
-        grid=replace(grid, rows=np.arange(len(places)) + 2),
-        filled=len(places),
-        notes=(*dict.fromkeys(note for t in several for note in t.notes),),
-        left_out=(*dict.fromkeys(note for t in several for note in t.left_out),),
-        runs=None if all(one is None for one in runs) else np.concatenate(blocks),
     )

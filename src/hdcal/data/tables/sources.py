@@ -8,17 +8,26 @@ from typing import Any
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
-from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
+from hdcal.data.tables.arrays import NAME, mat_grid, memory_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
-from hdcal.data.tables.shapes import joined_sheets, table_of
+from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text import LARGEST_FILE, decode, read_bytes, text_grid
-from hdcal.data.tables.workbook import refuse_formulas, sheet_grids
+from hdcal.data.tables.workbook import refuse_formulas, sheet_grid
 
 _WORKBOOK, _OLD_WORKBOOK = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 _MATLAB, _HDF5 = b"MATLAB 5.0", b"\x89HDF"
-_KINDS = {_WORKBOOK: "a workbook", _OLD_WORKBOOK: "an old workbook (.xls)"}
-_KINDS |= {PARQUET: "a Parquet file", _MATLAB: "a .mat file", _HDF5: "an HDF5 file"}
+_KINDS = {
+    _WORKBOOK: "a workbook",
+    _OLD_WORKBOOK: "an old workbook (.xls)",
+    PARQUET: "a Parquet file",
+    _MATLAB: "a .mat file",
+    _HDF5: "an HDF5 file, as MATLAB writes it since version 7.3",
+}
+_NOT_READ = {
+    _OLD_WORKBOOK: "Open it and save it as .xlsx or CSV",
+    _HDF5: "Save it with -v7, or as CSV",
+}
 
 
 def is_frame(data: Any) -> bool:
@@ -42,16 +51,15 @@ def read_source(
 
     Args:
         data: a path, a DataFrame, or arrays by name.
-        findings: of the source.
-        encoding: of a text; by default the likeliest.
-        sheet: of a workbook; by default the only one with readings. With an asterisk it
-            stands for several, each of them a specimen.
+        findings: findings on the source.
+        encoding: encoding of a text; by default the likeliest.
+        sheet: sheet of a workbook; by default the only one with readings.
 
     Raises:
         InputError: it holds no table, or it is not clear which one is meant.
     """
     if is_frame(data):
-        grid, sha256 = frame_grid(data, findings)
+        grid, sha256 = memory_grid(data, findings)
         return table_of(grid, findings), sha256
     path = Path(data)
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:
@@ -60,11 +68,9 @@ def read_source(
         return _file_table(path, findings, encoding, sheet)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
-    except PermissionError:
-        findings.refuse("may not be read", "Give yourself the permission to read it")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        findings.refuse(f"cannot be read ({reason})", "Check the name and the disk")
+        findings.refuse(f"cannot be read ({reason})", "Check name and permissions")
 
 
 def text_of(path: Path, sheet: str | None = None) -> bytes:
@@ -93,46 +99,31 @@ def _file_table(
     path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
 ) -> tuple[ReadTable, str]:
     """Return the table of a file, and the hash of its bytes."""
-    kind = _kind(path)
-    _refuse_kind(kind, findings, encoding, sheet)
-    if kind == _WORKBOOK:
-        grids, notes = sheet_grids(path, findings, sheet)
-        if sheet is not None and "*" in sheet:
-            table = joined_sheets(grids, findings)
-        else:
-            table = table_of(next(iter(grids.values())), findings)
-        if any(table.headers[place] for place in table.empty):
-            refuse_formulas(path, findings)
-    else:
-        if kind == PARQUET:
-            grid, notes = parquet_grid(path, findings), []
-        elif kind == _MATLAB:
-            grid, notes = mat_grid(path, findings)
-        else:
-            raw = read_bytes(path, findings, wide=encoding is not None)
-            text, guessed = decode(raw, findings, encoding)
-            if not text.strip():
-                remedy = "Write a header row and at least 5 rows of readings"
-                findings.refuse("the file is empty", remedy)
-            grid, notes = text_grid(text)
-            notes = [*guessed, *notes]
-        table = table_of(grid, findings)
-    with open(path, "rb") as stream:
-        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-    return replace(table, notes=(*notes, *table.notes)), sha256
-
-
-def _refuse_kind(
-    kind: bytes, findings: FileFindings, encoding: str | None, sheet: str | None
-) -> None:
-    """Refuse kinds of files that are not read, and options that a kind has not."""
+    kind, notes = _kind(path), []
     if kind and encoding is not None:
         words = f"is {_KINDS[kind]}, which has no `encoding`"
         findings.refuse(words, "Leave it out")
     if kind != _WORKBOOK and sheet is not None:
         findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
-    if kind == _OLD_WORKBOOK:
-        findings.refuse(f"is {_KINDS[kind]}", "Open it and save it as .xlsx or CSV")
-    if kind == _HDF5:
-        words = "is an HDF5 file, as MATLAB writes it since version 7.3"
-        findings.refuse(words, "Save it with -v7, or as CSV")
+    if kind in _NOT_READ:
+        findings.refuse(f"is {_KINDS[kind]}", _NOT_READ[kind])
+    if kind == _WORKBOOK:
+        grid, notes = sheet_grid(path, findings, sheet)
+    elif kind == PARQUET:
+        grid = parquet_grid(path, findings)
+    elif kind == _MATLAB:
+        grid, notes = mat_grid(path, findings)
+    else:
+        raw = read_bytes(path, findings, wide=encoding is not None)
+        text, guessed = decode(raw, findings, encoding)
+        if not text.strip():
+            remedy = "Write a header row and at least 5 rows of readings"
+            findings.refuse("the file is empty", remedy)
+        grid, notes = text_grid(text)
+        notes = [*guessed, *notes]
+    table = table_of(grid, findings)
+    if kind == _WORKBOOK and any(table.headers[place] for place in table.empty):
+        refuse_formulas(path, findings)
+    with open(path, "rb") as stream:
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+    return replace(table, notes=(*notes, *table.notes)), sha256

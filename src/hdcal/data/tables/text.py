@@ -64,11 +64,6 @@ def decode(
 ) -> tuple[str, list[str]]:
     """Return a text with plain newlines, and notes on its encoding.
 
-    Args:
-        raw: the bytes.
-        findings: of the file.
-        encoding: by default UTF-8, UTF-16 with its mark, or the likeliest.
-
     Raises:
         InputError: they are no text in it, or a web page.
     """

@@ -15,8 +15,8 @@ from hdcal.data.tables.cells import (
     read_numbers,
     thousands,
 )
+from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS
-from hdcal.data.tables.named_columns import Column
 from hdcal.errors import quoted
 
 # Share of cells from which on a column is no slow channel, and cells that make one.
@@ -93,7 +93,7 @@ def _numbers(
         # One decimal mark serves all columns: some may have been read by another.
         cells = {place: np.array(table.grid.texts(place), object) for place in cells}
         odd = {*cells}
-    comma = has_comma(column for place, column in cells.items() if place in odd)
+    comma = bool(odd) and has_comma(cells.values())
     values = {}
     for name, column in numeric.items():
         numbers, faults = cells[column.position], []
@@ -115,7 +115,7 @@ def _labels(
     empty = np.array([text == "" for text in texts], bool)[index]
     # As merged cells do; where most rows have a label, an empty one was forgotten.
     if len(index) and not empty[0] and 2 * empty.sum() > len(index):
-        words = "stands in the first row of each: the rows below it are taken for"
+        words = "stands in the first row of each: the rows below it count as"
         notes.append(f"the label of {quoted(column.header)} {words} the same")
         last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(index))))
         index, empty = index[last], np.zeros(len(index), bool)

@@ -12,7 +12,7 @@ import numpy as np
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import is_number
 from hdcal.data.tables.grid import ArrayGrid, stored_text
-from hdcal.errors import quoted
+from hdcal.errors import InputError, quoted
 
 # Largest content of an archive, unpacked, and rows of a sheet that are looked at.
 _LARGEST, _MOST_ROWS = 1 << 28, 1 << 20
@@ -22,48 +22,62 @@ _FEWEST = 5
 Rows = list[tuple[Any, ...]]
 
 
-def sheet_grids(
+def sheet_grid(
     path: Path, findings: FileFindings, sheet: str | None
-) -> tuple[dict[str, ArrayGrid], list[str]]:
-    """Return the sheets that are meant, by name, and notes on what was assumed.
-
-    Args:
-        path: of the workbook.
-        findings: of the file.
-        sheet: its name; by default the only one that holds a table of readings. With an
-            asterisk it stands for every such sheet.
+) -> tuple[ArrayGrid, list[str]]:
+    """Return a sheet, and notes on what was assumed.
 
     Raises:
         InputError: it is no workbook, or it is not clear which sheet is meant.
     """
-    sheets = _sheets(path, findings)
-    several = sheet is not None and "*" in sheet
-    exact = sheet is not None and not several
-    # A name may hold an asterisk itself.
-    pattern = "*" if sheet is None else sheet
-    named = [n for n in sheets if n == sheet or (not exact and fnmatchcase(n, pattern))]
+    sheets = _sheets(path, findings, sheet)
+    if sheet is not None:
+        return _grid(sheets[sheet]), []
+    likely = _tables(path, findings, sheets)
+    if len(likely) > 1:
+        words = f"{len(likely)} sheets hold a table: {_listed(likely)}"
+        findings.refuse(words, _WHICH)
+    note = f"sheet {quoted(likely[0])} is read. If another is meant, name it"
+    return _grid(sheets[likely[0]]), [note] if len(sheets) > 1 else []
 
-    def names(some: list[str]) -> str:
-        return ", ".join(map(quoted, some))
 
+def sheets_like(
+    path: Path, findings: FileFindings, pattern: str
+) -> tuple[list[str], str]:
+    """Return the sheets that hold a table, by a pattern of names, and a note.
+
+    Raises:
+        InputError: there is none.
+    """
+    sheets = _sheets(path, findings, None)
+    named = {n: rows for n, rows in sheets.items() if fnmatchcase(n, pattern)}
     if not named:
-        words = f"has no `sheet` {quoted(sheet or '')}"
-        findings.refuse(words, f"Name one of: {names([*sheets])}")
-    likely = named if exact else [name for name in named if _is_table(sheets[name])]
+        words = f"has no `sheet` {quoted(pattern)}"
+        findings.refuse(words, f"Name one of: {_listed([*sheets])}")
+    likely = _tables(path, findings, named)
+    few = [name for name in named if name not in likely]
+    left_out = f"; left out, as too few readings: {_listed(few)}" if few else ""
+    return likely, f"each sheet is a specimen: {_listed(likely)}{left_out}"
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(map(quoted, names))
+
+
+def _tables(path: Path, findings: FileFindings, sheets: dict[str, Rows]) -> list[str]:
+    """Return the sheets with enough rows of two numbers; there has to be one."""
+    likely = [name for name, rows in sheets.items() if _is_table(rows)]
     if not likely:
         refuse_formulas(path, findings)
         remedy = f"Write at least {_FEWEST} rows of readings below headers"
-        findings.refuse(f"no sheet holds a table of readings: {names(named)}", remedy)
-    if len(likely) > 1 and not several:
-        findings.refuse(f"{len(likely)} sheets hold a table: {names(likely)}", _WHICH)
-    notes = []
-    if several:
-        few = [name for name in named if name not in likely]
-        left_out = f"; left out, as too few readings: {names(few)}" if few else ""
-        notes = [f"each sheet is a specimen: {names(likely)}{left_out}"]
-    elif len(sheets) > 1 and not exact:
-        notes = [f"sheet {quoted(likely[0])} is meant. If not, name the sheet"]
-    return {name: _grid(sheets[name]) for name in likely}, notes
+        words = f"no sheet holds a table of readings: {_listed([*sheets])}"
+        findings.refuse(words, remedy)
+    return likely
+
+
+def _is_table(rows: Rows) -> bool:
+    numbers = (sum(is_number(stored_text(cell)) for cell in row) for row in rows)
+    return sum(many >= 2 for many in numbers) >= _FEWEST
 
 
 def _grid(rows: Rows) -> ArrayGrid:
@@ -74,12 +88,12 @@ def _grid(rows: Rows) -> ArrayGrid:
     filled = cells != ""
     cells = cells[:, filled.any(axis=0)]
     places = np.arange(len(rows)) + 1
-    grid = ArrayGrid(places, cells.shape[1], [], lambda place: cells[:, place])
+    grid = ArrayGrid(places, cells.shape[1], [], [*cells.T])
     return grid.take(filled.any(axis=1))
 
 
-def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
-    """Return the cells of every sheet, by name."""
+def _sheets(path: Path, findings: FileFindings, only: str | None) -> dict[str, Rows]:
+    """Return the cells of every sheet by name, or of one alone."""
     broken = "is no workbook that can be read"
     try:
         with zipfile.ZipFile(path) as archive:
@@ -89,13 +103,20 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
     if size > _LARGEST:
         findings.refuse("is a workbook of more than 256 MiB", "Save it as CSV")
     try:
+        every = {each.title: each for each in _open(path, values=True).worksheets}
+        if only is not None and only not in every:
+            words = f"has no `sheet` {quoted(only)}"
+            findings.refuse(words, f"Name one of: {_listed([*every])}")
         return {
-            each.title: [
+            name: [
                 tuple(map(_cell, row))
                 for row in each.iter_rows(max_row=_MOST_ROWS, values_only=True)
             ]
-            for each in _open(path, values=True).worksheets
+            for name, each in every.items()
+            if only in (None, name)
         }
+    except InputError:
+        raise
     except ImportError:
         remedy = "Save it as CSV, or install what reads it: pip install openpyxl"
         findings.refuse("is a workbook", remedy)
@@ -131,13 +152,3 @@ def _cell(cell: Any) -> Any:
     if isinstance(cell, datetime.datetime | datetime.date | datetime.time):
         return cell.isoformat()
     return "" if cell is None else " ".join(str(cell).split())
-
-
-def _is_table(rows: Rows) -> bool:
-    """Tell whether enough rows hold two numbers or more."""
-    count = 0
-    for row in rows:
-        count += sum(is_number(stored_text(cell)) for cell in row) >= 2
-        if count >= _FEWEST:
-            return True
-    return False
