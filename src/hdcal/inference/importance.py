@@ -62,7 +62,7 @@ class Proposals(NamedTuple):
     def log_density(self, place: np.ndarray) -> np.ndarray:
         """Return the log density at each place, shape (n, d)."""
         each = [self._t(width).logpdf(place) for width in _WIDTHS]
-        return logsumexp(each, axis=0, b=_SHARES[:, None])
+        return np.asarray(logsumexp(each, axis=0, b=_SHARES[:, None]))
 
     def _t(self, size: float) -> Any:
         scale: Any = size**2 * self.covariance

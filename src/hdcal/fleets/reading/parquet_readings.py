@@ -214,7 +214,7 @@ def _irregular(
     x, odd = read["deformation"], irregular(sums, v, index)
     if odd.mean() > 0.5:
         rows = np.isin(index, np.flatnonzero(odd)[:_SAMPLE])
-        found = screen(x[rows], read["force"][rows], None, index[rows], whole=False)
+        found = screen(x[rows], read["force"][rows], index[rows], whole=False)
         if not found.observations:
             # The noise of all gears is correlated.
             odd = irregular(sums, v, index, relative=True)
