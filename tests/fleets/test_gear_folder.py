@@ -244,7 +244,7 @@ def test_what_is_not_read_is_said(tmp_path):
     assert "G9.txt, more" in note
     first = folder / "G0.csv"
     first.rename(folder / "G1.CSV")
-    assert any("'G1' is what several files" in one for one in told(read_fleet, folder))
+    assert any("'G1' is the name of several files" in one for one in told(read_fleet, folder))
 
 
 def test_what_some_files_state_is_not_read_and_that_is_said(tmp_path):
