@@ -49,7 +49,7 @@ def one_place(x, force):
 FAULTS = [
     (jump, "jump of the force"),
     (broken, "drop of the force for good"),
-    (kilonewtons, "stiffness is 0.001 times"),
+    (kilonewtons, "stiffness is 1/10"),
     (stuck, "follow no curve"),
     (stuck_gauge, "follow no curve"),
     (dead, "does not grow"),

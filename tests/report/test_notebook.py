@@ -118,7 +118,7 @@ def test_a_case_says_what_was_guessed_of_it(results):
     case = hdcal.read_case(results["Case"][0].to_frame())
     assert case.notes
     shown = case._repr_html_()
-    assert "a spring of which nothing is known" in shown
+    assert "without a gear file the part is a spring" in shown
 
 
 def test_residuals_say_their_shapes(results):

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.tables.arrays import NAME, mat_grid, memory_grid
@@ -13,7 +15,7 @@ from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
 from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text import LARGEST_FILE, decode, read_bytes, text_grid
-from hdcal.data.tables.workbook import refuse_formulas, sheet_grid
+from hdcal.data.tables.workbook import refuse_formulas, sheet_grid, sheets_like
 
 _WORKBOOK, _OLD_WORKBOOK = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
 _MATLAB, _HDF5 = b"MATLAB 5.0", b"\x89HDF"
@@ -74,18 +76,28 @@ def read_source(
 
 
 def text_of(path: Path, sheet: str | None = None) -> bytes:
-    """Return the bytes of a text file as they are, of any other the table as text."""
+    """Return the bytes of a text file as they are, of any other the table as text.
+
+    Of several sheets, by a name with an asterisk, each is a specimen.
+    """
     if not _kind(path):
         return path.read_bytes()
     with FileFindings(str(path)) as findings:
-        table, _ = read_source(path, findings, sheet=sheet)
-    columns = [table.grid.texts(place) for place in range(len(table.headers))]
-    headers = [*table.headers]
-    if table.runs is not None and "run" not in headers:
-        columns.append([str(run + 1) for run in table.runs])
-        headers.append("run")
-    rows = [*([headers] if table.named else []), *zip(*columns, strict=True)]
-    return "".join("\t".join(row) + "\n" for row in rows).encode()
+        several = "*" in (pattern := sheet or "")
+        sheets = sheets_like(path, findings, pattern)[0] if several else [sheet]
+        tables = [read_source(path, findings, sheet=name)[0] for name in sheets]
+        headers, width = tables[0].headers, len(tables[0].headers)
+        if any(table.headers != headers for table in tables):
+            findings.refuse("the sheets have different columns", "Name one of them")
+    frames = []
+    for name, table in zip(sheets, tables, strict=True):
+        columns: dict[Any, Any] = dict(enumerate(map(table.grid.texts, range(width))))
+        if table.runs is not None and "run" not in headers:
+            columns["run"] = (table.runs + 1).astype(str)
+        frames.append(pd.DataFrame(columns | ({"specimen": name} if several else {})))
+    whole = pd.concat(frames).fillna({"run": "1"})
+    whole = whole.rename(columns=dict(enumerate(headers)))
+    return whole.to_csv(sep="\t", index=False, header=tables[0].named).encode()
 
 
 def _kind(path: Path) -> bytes:
