@@ -52,8 +52,11 @@ class Sampling:
             )
         else:
             found = sample(problem, whitening, self.seed, warmup=self.warmup, **size)
-            values = found.values
-            checks = sampling_checks(found, mixing(_free(values, problem)))
+            # A run may be longer than asked for: all quantities have as many draws.
+            longer = next(iter(found.values.values())).shape[1]
+            kept = np.linspace(0, longer - 1, self.draws).round().astype(int)
+            values = {site: v[:, kept] for site, v in found.values.items()}
+            checks = sampling_checks(found, mixing(_free(found.values, problem)))
         named = [replace(one, name=f"{name}: {one.name}") for one in checks]
         return {site: v.reshape(-1) for site, v in values.items()}, tuple(named)
 
