@@ -149,7 +149,7 @@ def shaken():
 
 @pytest.mark.thorough
 def test_a_record_that_warms_determines_alpha():
-    found = calibrate_dynamic(shaken(), chains=2, **SHORT)
+    found = calibrate_dynamic(shaken(), chains=2, **SHORT | {"draws": 1000})
     assert found.usable, found.reasons
     alpha = found.draws["alpha"]
     assert found.diagnoses["alpha"].driven_by == "data"
