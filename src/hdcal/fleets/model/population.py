@@ -5,7 +5,7 @@ in the other quantities, which tell next to nothing of the noise.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,10 @@ from hdcal.fleets.model.sampling import Sampling
 from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import Check
+from hdcal.inference.sample import Progress
 
-QUANTITIES = ("stiffness", "zero", "noise", "loop", "bend")
+# In the order in which they are sampled.
+QUANTITIES = ("noise", "stiffness", "zero", "loop", "bend")
 # Names of sites in the draws; other sites get the name of the quantity before theirs.
 _SITES = {
     "stiffness": {
@@ -105,7 +107,8 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
 
     def sampled(name: str, problem, start) -> dict[str, np.ndarray]:
         """Return the draws of the population of a quantity."""
-        values, found = sampling.run(name, problem.some(chosen), start)
+        part = replace(sampling, progress=_part(sampling.progress, name))
+        values, found = part.run(name, problem.some(chosen), start)
         checks.extend(found)
         for site, value in values.items():
             plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
@@ -160,6 +163,14 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
             "draws": sampling.draws,
         },
     )
+
+
+def _part(progress: Progress | None, name: str) -> Progress | None:
+    """Return a progress of one quantity, as a part of that of all quantities."""
+    if progress is None:
+        return None
+    before, every = QUANTITIES.index(name), len(QUANTITIES)
+    return lambda done, total: progress(before * total + done, every * total)
 
 
 def _some(
