@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.fleets.model.gear_noise import gear_noise
+from hdcal.fleets.model.gear_noise import GearNoise, gear_noise
 from hdcal.fleets.model.gear_quantity import GearQuantity, draw_gears
 from hdcal.fleets.model.groups import group_offsets
 from hdcal.fleets.model.line_fits import line_fits
@@ -53,6 +53,7 @@ _AVERAGED = 100
 # a million in all, and at most as many as memory holds.
 _GEAR_DRAWS, _IN_ALL, _MOST_DRAWN = 400, 1_000_000, 20_000_000
 _INTERVAL = (0.025, 0.5, 0.975)
+_SETTINGS = ("seed", "chains", "warmup", "draws")
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,39 @@ class FittedFleet:
     settings: Mapping[str, Any]
 
 
+class _Populations:
+    """Draws and checks of the populations that were sampled so far.
+
+    Args:
+        sampling: settings of the samplers.
+        gears: number of gears.
+    """
+
+    def __init__(self, sampling: Sampling, gears: int):
+        rng = np.random.default_rng(sampling.seed)
+        self._sampling = sampling
+        self._chosen = np.sort(rng.permutation(gears)[:MOST_SAMPLED])
+        self.draws: dict[str, np.ndarray] = {}
+        self.checks: list[Check] = []
+
+    def sample(
+        self,
+        name: str,
+        problem: GearNoise | GearQuantity,
+        start: Mapping[str, float],
+        many: int = _AVERAGED,
+    ) -> dict[str, np.ndarray]:
+        """Sample the population of a quantity, and return so many of its draws."""
+        part = replace(self._sampling, progress=_part(self._sampling.progress, name))
+        values, checks = part.run(name, problem.some(self._chosen), start)
+        self.checks.extend(checks)
+        for site, value in values.items():
+            plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
+            self.draws[_SITES[name].get(site, plain)] = value
+        every = -(-len(next(iter(values.values()))) // many)
+        return {site: value[::every] for site, value in values.items()}
+
+
 def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
     """Sample the population, and every gear given its draws.
 
@@ -94,60 +128,42 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         readings: at the sizes of the gear file.
         sampling: settings of the samplers.
     """
-    sums = readings.sums
+    sums, seed = readings.sums, sampling.seed
     groups = FleetGroups.of(readings.case, sums.run)
     fits = line_fits(sums, groups.rig, readings.step)
     unit, priors = population_priors(readings.case)
     gears = len(groups.lot)
-    draws: dict[str, np.ndarray] = {}
-    checks: list[Check] = []
-
-    rng = np.random.default_rng(sampling.seed)
-    chosen = np.sort(rng.permutation(gears)[:MOST_SAMPLED])
-
-    def sampled(name: str, problem, start) -> dict[str, np.ndarray]:
-        """Return the draws of the population of a quantity."""
-        part = replace(sampling, progress=_part(sampling.progress, name))
-        values, found = part.run(name, problem.some(chosen), start)
-        checks.extend(found)
-        for site, value in values.items():
-            plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
-            draws[_SITES[name].get(site, plain)] = value
-        return values
+    populations = _Populations(sampling, gears)
 
     noisy, start = noise_problem(fits, priors)
-    noise, noise_sd, odd = gear_noise(noisy, _some(sampled("noise", noisy, start)))
+    noise, noise_sd, odd = gear_noise(noisy, populations.sample("noise", noisy, start))
     table = {"noise_sd_N": noise_sd, "off_noise": odd}
 
     slots = max(map(int, (np.bincount(fits.gear).max(), np.bincount(sums.gear).max())))
     problems = Problems(groups, noise, noise_sd, priors, slots)
     problem, start = problems.stiffness(fits)
     many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
-    values = _some(sampled("stiffness", problem, start), many)
-    drawn = draw_gears(problem, values, sampling.seed)
-    apart, odd = np.asarray(drawn.apart), np.asarray(drawn.off).mean(axis=0)
-    lots = np.asarray(group_offsets(values, "lot"))[groups.lot].T
-    stiffness = values["centre"][:, None] * (1.0 + lots) * (1.0 + apart)
-    table |= _stiffness_columns(stiffness, apart, values["spread"])
-    table["off_stiffness"] = odd
+    values = populations.sample("stiffness", problem, start, many)
+    stiffness, columns = _stiffness(problem, values, seed)
+    table |= columns
 
     zeros, error, shared = _zeros(sums, groups.rig)
     zeros, widening = readings.side * zeros, fits.widening
     problem, start = problems.zero(sums, zeros, widening * error, widening * shared)
-    values = _some(sampled("zero", problem, start))
+    values = populations.sample("zero", problem, start)
     table["zero_N"] = np.bincount(sums.gear, zeros) / np.bincount(sums.gear)
-    table["off_zero"] = _odd(problem, values, sampling.seed)
+    table["off_zero"] = _odd(problem, values, seed)
 
-    largest = abs(readings.largest) * float(np.median(fits.slope))
+    largest_force = abs(readings.largest * float(np.median(fits.slope)))
     for name in ("loop", "bend"):
         table |= {f"{name}_N": np.full(gears, np.nan), f"off_{name}": np.zeros(gears)}
-        shape = problems.shape(fits, name, abs(largest))
+        shape = problems.shape(fits, name, largest_force)
         if shape is not None:
-            values = _some(sampled(name, *shape))
+            values = populations.sample(name, *shape)
             table[f"{name}_N"] = _means(getattr(fits, name), fits.gear, gears)
-            table[f"off_{name}"] = _odd(shape[0], values, sampling.seed)
+            table[f"off_{name}"] = _odd(shape[0], values, seed)
     return FittedFleet(
-        draws=draws,
+        draws=populations.draws,
         gears=pd.DataFrame(table),
         stiffness=stiffness,
         correlation=fits.correlation,
@@ -155,12 +171,9 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         operators=groups.operators,
         rigs=groups.rigs,
         unit=unit,
-        checks=tuple(checks),
+        checks=tuple(populations.checks),
         settings={
-            "seed": sampling.seed,
-            "chains": sampling.chains,
-            "warmup": sampling.warmup,
-            "draws": sampling.draws,
+            n: getattr(sampling, n) for n in ("seed", "chains", "warmup", "draws")
         },
     )
 
@@ -173,28 +186,21 @@ def _part(progress: Progress | None, name: str) -> Progress | None:
     return lambda done, total: progress(before * total + done, every * total)
 
 
-def _some(
-    values: Mapping[str, np.ndarray], many: int = _AVERAGED
-) -> dict[str, np.ndarray]:
-    """Return so many of the draws, at even distances."""
-    every = -(-len(next(iter(values.values()))) // many)
-    return {name: value[::every] for name, value in values.items()}
-
-
-def _stiffness_columns(
-    stiffness: np.ndarray, apart: np.ndarray, spread: np.ndarray
-) -> dict[str, np.ndarray]:
-    low, middle, high = np.quantile(stiffness, _INTERVAL, axis=0)
-    apart_low, apart_middle, apart_high = np.quantile(100.0 * apart, _INTERVAL, axis=0)
-    return {
-        "stiffness": middle,
-        "stiffness_lo": low,
-        "stiffness_hi": high,
-        "apart_percent": apart_middle,
-        "apart_lo": apart_low,
-        "apart_hi": apart_high,
-        "distance_sd": np.median(apart / spread[:, None], axis=0),
-    }
+def _stiffness(
+    problem: GearQuantity, values: Mapping[str, np.ndarray], seed: int
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return draws of the stiffness of each gear, shape (t, g), and its columns."""
+    drawn = draw_gears(problem, values, seed)
+    apart = np.asarray(drawn.apart)
+    lots = np.asarray(group_offsets(values, "lot"))[np.asarray(problem.lot)].T
+    stiffness = values["centre"][:, None] * (1.0 + lots) * (1.0 + apart)
+    columns = {"off_stiffness": np.asarray(drawn.off).mean(axis=0)}
+    for name, draws in (("stiffness", stiffness), ("apart", 100.0 * apart)):
+        low, middle, high = np.quantile(draws, _INTERVAL, axis=0)
+        columns |= {name: middle, f"{name}_lo": low, f"{name}_hi": high}
+    columns["apart_percent"] = columns.pop("apart")
+    distance = np.median(apart / values["spread"][:, None], axis=0)
+    return stiffness, columns | {"distance_sd": distance}
 
 
 def _zeros(
