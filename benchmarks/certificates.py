@@ -20,11 +20,12 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.records import Records
 from hdcal.inference import laplace
+from hdcal.inference.force_model.priors import problem_priors
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.structure import decide_structure
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import dataset
-from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.sample import sample
-from hdcal.inference.structure import decide_structure
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.members import one_member
 from hdcal.prediction.models import models_of

@@ -62,7 +62,7 @@ def make_problem():
     """Return hdcal's problem: the XB1-100-80 case, neither rounded nor correlated."""
     from hdcal import read_case
     from hdcal.data.priors import Prior, effect_priors
-    from hdcal.inference.problem import build_problem
+    from hdcal.inference.force_model.problem import build_problem
 
     case = read_case(CASE)
     alone = case.gear.scale_priors | {"noise_correlation": Prior("fixed", (0.0,))}

@@ -69,7 +69,7 @@ def measure(repeats: int) -> dict:
     from hdcal import read_case
     from hdcal.data.priors import effect_priors
     from hdcal.inference import laplace
-    from hdcal.inference.problem import build_problem
+    from hdcal.inference.force_model.problem import build_problem
     from hdcal.inference.sample import sample
 
     small = read_case(CASE)

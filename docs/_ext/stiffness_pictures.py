@@ -6,8 +6,8 @@ import numpy as np
 from sphinx.application import Sphinx
 
 import hdcal
-from hdcal.report.chart_drawing import images
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.chart_drawing import images
+from hdcal.report.charts.chart_spec import (
     BLUE,
     GREEN,
     GREY,

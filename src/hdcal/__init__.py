@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from hdcal.fleets.fleet import fleet
     from hdcal.fleets.posterior import FleetPosterior
     from hdcal.fleets.result import Fleet
+    from hdcal.inference.force_model.residuals import residuals
     from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
-    from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
     from hdcal.motion.dynamic_problem import DynamicPosterior
     from hdcal.motion.respond import respond
@@ -71,7 +71,7 @@ _HOMES = {
     "parameter": "physics.effect",
     "predict": "prediction.bands.predict",
     "read_case": "data.reading",
-    "residuals": "inference.residuals",
+    "residuals": "inference.force_model.residuals",
     "respond": "motion.respond",
     "study": "design.study",
     "summarise": "calibration.calibration",

@@ -24,10 +24,10 @@ from hdcal.data.priors import Prior, effect_priors
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.marginal import draw_members
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.marginal import draw_members
+from hdcal.inference.force_model.problem import build_problem
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS

@@ -24,7 +24,7 @@ from hdcal.calibration.calibration import (
 )
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import PLAUSIBLE, Check
-from hdcal.report.chart_spec import Band, Line, Points
+from hdcal.report.charts.chart_spec import Band, Line, Points
 
 X = np.linspace(0.02, 0.54, 60)
 

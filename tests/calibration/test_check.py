@@ -8,7 +8,7 @@ import pytest
 from commands import Hdcal
 from schema_checks import obeys
 
-from hdcal.calibration.check.check import Check, check
+from hdcal.calibration.check.check import CaseCheck, check
 from hdcal.data.reading import read_case
 
 X = np.linspace(0.0, 0.5, 6)
@@ -68,7 +68,7 @@ def test_a_folder_is_checked_as_a_fleet_is_read(here: Hdcal, line: Path):
     done = here("check", "line", "--json", "--write-gear", "line/gear.toml")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    obeys(answer, Check)
+    obeys(answer, CaseCheck)
     slopes = {s["name"]: s["stiffness_N_per_mm"] for s in answer["specimens"]}
     assert slopes == pytest.approx(SLOPES)
     assert "`fleet`" in answer["next_step"] and answer["case"] == "line"

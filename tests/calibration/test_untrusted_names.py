@@ -11,7 +11,7 @@ from slices import slice_of
 from hdcal.calibration.calibration import calibration_of
 from hdcal.data.prior import Prior
 from hdcal.inference.posterior import Posterior
-from hdcal.report.chart_drawing import images
+from hdcal.report.charts.chart_drawing import images
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 from commands import MAIN, XB1, Hdcal
 from schema_checks import obeys
 
-from hdcal.calibration.check.check import Check
+from hdcal.calibration.check.check import CaseCheck
 from hdcal.calibration.effects.effects import Effects
 from hdcal.physics.registry import EFFECTS
 
@@ -52,7 +52,7 @@ def test_version_effects_and_check(here: Hdcal):
     assert [effect["name"] for effect in effects["effects"]] == list(EFFECTS)
     done = here("check", XB1, "--json")
     found = json.loads(done.stdout)
-    obeys(found, Check)
+    obeys(found, CaseCheck)
     assert (done.returncode, found["data"]["rows"]) == (0, 14)
     assert found["data"]["direction"] == {"loading": 14, "holding": 0, "unloading": 0}
     assert found["effects"]["not_testable"]["coulomb_friction"] == ["unloading"]

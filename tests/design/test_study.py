@@ -16,7 +16,7 @@ from hdcal.design.gears import draw_gears
 from hdcal.design.study import force_quantiles, study
 from hdcal.errors import InputError
 from hdcal.physics.theory import ring
-from hdcal.report.chart_spec import Line
+from hdcal.report.charts.chart_spec import Line
 
 GEAR = make_gear(
     K=Prior("lognormal", (2.2, 0.1)),

@@ -15,7 +15,7 @@ from scipy.stats import norm
 from hdcal.design.springs import SpringGap, best_common, judge, set_points
 from hdcal.design.wave_generator import WaveGenerator, wave_generator
 from hdcal.errors import InputError
-from hdcal.report.chart_spec import Band, Span
+from hdcal.report.charts.chart_spec import Band, Span
 
 WINDOW = (0.38, 0.42)
 

@@ -19,7 +19,7 @@ from hdcal.diagnosis.result import Diagnosis
 from hdcal.evidence.linear_problem import linear_problem
 from hdcal.evidence.search import Searched, search
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.chart_spec import Band, Line
+from hdcal.report.charts.chart_spec import Band, Line
 
 HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
 

@@ -10,11 +10,11 @@ from scipy.stats import multivariate_normal
 from hdcal.fleets.model.gear_noise import GearNoise
 from hdcal.fleets.model.gear_quantity import (
     GearQuantity,
-    Noise,
+    NoiseNodes,
     draw_gears,
     gear_posterior,
 )
-from hdcal.inference.likelihood import log_likelihood
+from hdcal.inference.force_model.likelihood import log_likelihood
 
 # One-way layouts. Davies, Statistical Methods in Research and Production (1947): yields
 # of dyestuff from six batches; lme4 gives the sds 42.0 and 49.5 by REML. NIST StRD:
@@ -64,7 +64,7 @@ def problem(seed: int = 0, *, relative: float, by_row: float) -> GearQuantity:
         operator=rng.integers(0, 2, shape),
         shared=1e-4 * relative + rng.uniform(0.0, 1e-4 if relative else 2.0, GEARS),
         lot=np.array([0, 1, 1, 0]),
-        noise=Noise(rng.uniform(0.5, 2.0, (GEARS, 1)), jnp.zeros(1)),
+        noise=NoiseNodes(rng.uniform(0.5, 2.0, (GEARS, 1)), jnp.zeros(1)),
         groups={},
         relative=np.asarray(relative),
         by_row=np.asarray(by_row),
@@ -158,7 +158,7 @@ def reml(layout) -> float:
         operator=np.zeros((gears, 1), int),
         shared=np.zeros(gears),
         lot=np.zeros(gears, int),
-        noise=Noise(np.full((gears, 1), np.sqrt(within)), jnp.zeros(1)),
+        noise=NoiseNodes(np.full((gears, 1), np.sqrt(within)), jnp.zeros(1)),
         groups={},
         relative=np.asarray(0.0),
         by_row=np.asarray(0.0),

@@ -13,8 +13,8 @@ from structures import form_of
 
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
-from hdcal.inference.problem import build_problem
-from hdcal.inference.values import member_base
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.registry import EFFECTS
 
@@ -111,7 +111,7 @@ def test_ranks_are_uniform_and_bands_cover(model, count):
 @pytest.mark.thorough
 def test_a_broken_likelihood_is_caught(monkeypatch):
     """The same run on a model that believes a tenth of the noise it has."""
-    from hdcal.inference import likelihood
+    from hdcal.inference.force_model import likelihood
 
     honest = likelihood.linear_part
 

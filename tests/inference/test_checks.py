@@ -25,10 +25,10 @@ from hdcal.inference.diagnostics import (
     mixing,
     pareto_shape,
 )
-from hdcal.inference.identifiability import identification_checks, linearise
-from hdcal.inference.problem import build_problem
+from hdcal.inference.force_model.identifiability import identification_checks, linearise
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.sample import Draws
-from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.registry import EFFECTS
 
 CHAINS, DRAWS = 4, 500

@@ -12,9 +12,9 @@ from structures import form_of
 from hdcal import EFFECTS, calibrate
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior, effect_priors
-from hdcal.inference import model
-from hdcal.inference.problem import build_problem
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.force_model import model
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 
 NAMES = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
 ALONE = {"noise_correlation": Prior("fixed", (0.0,))}

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from hdcal.inference.discrepancy import (
+from hdcal.inference.force_model.discrepancy import (
     BASIS_SIZE,
     Discrepancy,
     build_discrepancy,

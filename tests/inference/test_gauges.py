@@ -15,10 +15,10 @@ from structures import form_of
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.gear_file.certificates import ForceCertificate, certificate_priors
 from hdcal.data.priors import effect_priors
-from hdcal.inference.likelihood import log_likelihood, log_prior
+from hdcal.inference.force_model.likelihood import log_likelihood, log_prior
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.values import with_gains
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import build_problem
-from hdcal.inference.values import with_gains
 from hdcal.motion.dynamic_problem import (
     build_dynamic,
     dynamic_site_priors,

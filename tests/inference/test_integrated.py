@@ -12,9 +12,9 @@ from structures import form_of
 
 from hdcal.data.priors import effect_priors
 from hdcal.errors import InputError
-from hdcal.inference import likelihood
-from hdcal.inference.marginal import Linear, contrasts, draw_members
-from hdcal.inference.problem import MEMBERS, build_problem
+from hdcal.inference.force_model import likelihood
+from hdcal.inference.force_model.marginal import Linear, contrasts, draw_members
+from hdcal.inference.force_model.problem import MEMBERS, build_problem
 
 # Known covariates, number of specimens, stated sds of a reading, leftover.
 STRUCTURES = {

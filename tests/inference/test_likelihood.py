@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from scipy.special import log_ndtr, logsumexp
 
-from hdcal.inference import likelihood
+from hdcal.inference.force_model import likelihood
 from hdcal.physics.effect import Noise
 
 log_probability = jax.jit(likelihood.log_probability, static_argnames="rounded")

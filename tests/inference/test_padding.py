@@ -11,10 +11,10 @@ from scipy import stats
 from structures import form_of
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference.identifiability import linearise
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.padding import bucket_size, measured, repeat_last_row
-from hdcal.inference.problem import build_problem
+from hdcal.inference.force_model.identifiability import linearise
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.padding import bucket_size, measured, repeat_last_row
+from hdcal.inference.force_model.problem import build_problem
 from hdcal.motion.dynamic_problem import (
     build_dynamic,
     dynamic_site_priors,

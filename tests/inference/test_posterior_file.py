@@ -9,7 +9,7 @@ import xarray as xr
 from posteriors import batch, beside, single, with_leftover
 
 from hdcal.errors import InputError, NotUsable
-from hdcal.inference import problem as problem_module
+from hdcal.inference.force_model import problem as problem_module
 from hdcal.inference.model_average import LeftOut, ModelAverage, load_models
 from hdcal.inference.posterior import HYPOTHESIS, Posterior
 from hdcal.inference.posterior_file import DIGEST, FORMAT

@@ -15,7 +15,7 @@ from hdcal.calibration.calibration import calibration_of
 from hdcal.data.prior import Prior
 from hdcal.data.priors import rig_priors
 from hdcal.data.resources import datasets_folder
-from hdcal.inference.residual_shapes import (
+from hdcal.inference.force_model.residual_shapes import (
     FALSE_ALARM,
     Correlated,
     Whitened,
@@ -23,8 +23,13 @@ from hdcal.inference.residual_shapes import (
     orthonormal,
     shapes_of,
 )
-from hdcal.inference.residuals import NEIGHBOURS, SCATTER, noise_faults, residuals
-from hdcal.inference.serial_correlation import (
+from hdcal.inference.force_model.residuals import (
+    NEIGHBOURS,
+    SCATTER,
+    noise_faults,
+    residuals,
+)
+from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
     previous_rows,
     whiten,

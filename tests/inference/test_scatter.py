@@ -14,9 +14,9 @@ from hdcal import calibrate
 from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
-from hdcal.inference import model
+from hdcal.inference.force_model import model
+from hdcal.inference.force_model.problem import MEMBER_SD, build_problem
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import MEMBER_SD, build_problem
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
 

@@ -8,9 +8,13 @@ from rigs import autoregression, make_case, make_gear, make_records
 
 import hdcal
 from hdcal.data.prior import Prior
-from hdcal.inference import noise_form
-from hdcal.inference.noise_form import noise_grows, pilot_fit
-from hdcal.inference.structure import NONE_SHOWN, ModelStructure, decide_structure
+from hdcal.inference.force_model import noise_form
+from hdcal.inference.force_model.noise_form import noise_grows, pilot_fit
+from hdcal.inference.force_model.structure import (
+    NONE_SHOWN,
+    ModelStructure,
+    decide_structure,
+)
 from hdcal.physics.effect import Noise, Rows, parameters
 from hdcal.physics.registry import EFFECTS
 

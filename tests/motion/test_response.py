@@ -12,7 +12,7 @@ from schema_checks import obeys
 
 from hdcal import InputError, NotUsable, respond
 from hdcal.data.case import Gear
-from hdcal.inference.discrepancy import BASIS_SIZE
+from hdcal.inference.force_model.discrepancy import BASIS_SIZE
 from hdcal.motion import integration
 from hdcal.motion.respond import Response
 from hdcal.physics.linear_response import LinearGear, linear_response

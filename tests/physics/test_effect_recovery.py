@@ -10,7 +10,7 @@ from scipy import optimize
 from slices import slice_of
 
 from hdcal import EFFECTS
-from hdcal.inference.likelihood import log_probability
+from hdcal.inference.force_model.likelihood import log_probability
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import parameters
 

@@ -25,8 +25,8 @@ from jax.flatten_util import ravel_pytree
 from hdcal import EFFECTS
 from hdcal.data.priors import effect_priors
 from hdcal.data.units import to_code
-from hdcal.inference.likelihood import log_probability
-from hdcal.inference.padding import repeat_last_row
+from hdcal.inference.force_model.likelihood import log_probability
+from hdcal.inference.force_model.padding import repeat_last_row
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.dynamics import acting
 from hdcal.physics.effect import Effect, parameters

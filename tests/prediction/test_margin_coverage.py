@@ -16,8 +16,8 @@ from rigs import draw_truth, make_case, make_records, posterior_draws
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference.problem import build_problem
-from hdcal.inference.values import member_base
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.members import one_member, over_draws

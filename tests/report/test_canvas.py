@@ -6,7 +6,7 @@ from typing import Literal
 import pytest
 from matplotlib.figure import Figure
 
-from hdcal.report.canvas import render, style
+from hdcal.report.charts.canvas import render, style
 
 DATE: dict = {"svg": {"Date": None}, "png": {}}
 

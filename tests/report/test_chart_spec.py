@@ -9,9 +9,9 @@ import pytest
 from browser import look
 from matplotlib.figure import Figure
 
-from hdcal.report.chart_browser import chart_json
-from hdcal.report.chart_drawing import draw, draw_panel, images
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.chart_browser import chart_json
+from hdcal.report.charts.chart_drawing import draw, draw_panel, images
+from hdcal.report.charts.chart_spec import (
     MOST_DRAWN,
     Band,
     Bars,

@@ -15,7 +15,7 @@ from posteriors import single
 import hdcal
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
-from hdcal.inference.residual_shapes import Structure
+from hdcal.inference.force_model.residual_shapes import Structure
 from hdcal.notebook import RESULTS, Shown
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"

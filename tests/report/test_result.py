@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pydantic import ValidationError
 
 from hdcal.report import sentences
-from hdcal.report.chart_spec import Chart, Line, Panel
+from hdcal.report.charts.chart_spec import Chart, Line, Panel
 from hdcal.report.item import Draws, Interval, Item, quantity
 from hdcal.report.result import Result
 from hdcal.report.table_files import columns_csv

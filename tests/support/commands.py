@@ -65,7 +65,7 @@ def undrawn() -> Iterator[None]:
 
     They are made as ever; to draw one, as SVG and PNG, takes most of a report's time.
     """
-    from hdcal.report import canvas, chart_drawing
+    from hdcal.report.charts import canvas, chart_drawing
 
     with pytest.MonkeyPatch.context() as patch:
         for module in (canvas, chart_drawing):

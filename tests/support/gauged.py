@@ -6,7 +6,7 @@ from rigs import make_gear
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior
-from hdcal.inference.values import as_read
+from hdcal.inference.force_model.values import as_read
 
 SDS = {"force_gain": 0.005, "deformation_gain": 0.003, "temperature_offset": 10.0}
 

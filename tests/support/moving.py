@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from hdcal import EFFECTS
 from hdcal.data.priors import dynamic_priors
-from hdcal.inference.problem import unit_stiffness
+from hdcal.inference.force_model.priors import unit_stiffness
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 TRUTH = {

@@ -12,10 +12,11 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Convergence
+from hdcal.inference.force_model.priors import problem_priors
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import data_groups, dataset
-from hdcal.inference.problem import build_problem, problem_priors
-from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.versions import versions

@@ -16,11 +16,11 @@ from hdcal.data.priors import (
 from hdcal.data.records import Geometry, Records
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
-from hdcal.inference.problem import build_problem
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
+from hdcal.inference.force_model.structure import ModelStructure
+from hdcal.inference.force_model.values import build_effects, member_base, with_rounding
 from hdcal.inference.sample import sample
-from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.structure import ModelStructure
-from hdcal.inference.values import build_effects, member_base, with_rounding
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 

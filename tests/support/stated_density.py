@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
+from hdcal.inference.force_model.likelihood import log_likelihood, log_prior
 from hdcal.inference.laplace import potential, values_at
-from hdcal.inference.likelihood import log_likelihood, log_prior
 
 
 def base_places(rng, count: int = 8) -> dict[str, np.ndarray]:

@@ -3,7 +3,11 @@
 from dataclasses import replace
 
 from hdcal.data.case import Case
-from hdcal.inference.structure import NONE_SHOWN, ModelStructure, decide_structure
+from hdcal.inference.force_model.structure import (
+    NONE_SHOWN,
+    ModelStructure,
+    decide_structure,
+)
 
 
 def form_of(case: Case, effects=(), with_gap: bool = False) -> ModelStructure:

@@ -20,8 +20,8 @@ from streams import Followed, correlated, follow, with_correlation
 from hdcal.data.prior import Prior
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.model_average import ModelAverage
-from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.tracking.draw_forces import draws_of
 from hdcal.tracking.tracker import StreamReading, Tracker
 

@@ -15,19 +15,24 @@ from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.assembly import assemble, force_log_likelihood, run_settings
 from hdcal.inference.checks import (
     Check,
     correlation_check,
     growth_check,
     rounding_check,
 )
-from hdcal.inference.identifiability import linearise
-from hdcal.inference.noise_form import noise_grows, pilot_fit
+from hdcal.inference.force_model.assembly import (
+    assemble,
+    force_log_likelihood,
+    run_settings,
+)
+from hdcal.inference.force_model.identifiability import linearise
+from hdcal.inference.force_model.noise_form import noise_grows, pilot_fit
+from hdcal.inference.force_model.priors import problem_priors
+from hdcal.inference.force_model.problem import MEMBERS, Problem, build_problem
+from hdcal.inference.force_model.structure import decide_structure
 from hdcal.inference.posterior import STRUCTURE, Posterior
-from hdcal.inference.problem import MEMBERS, Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
-from hdcal.inference.structure import decide_structure
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.physics.registry import EFFECTS

@@ -14,14 +14,14 @@ from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
+from hdcal.inference.force_model.residuals import Residuals, residuals
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.predict import default_bands
 from hdcal.prediction.bands.result import Bands
 from hdcal.prediction.forces import force_of, grid_records
-from hdcal.report.chart_spec import Chart
-from hdcal.report.draws_charts import prior_chart, rank_chart
+from hdcal.report.charts.chart_spec import Chart
+from hdcal.report.charts.draws_charts import prior_chart, rank_chart
 from hdcal.report.item import Interval, Item, Words, quantity
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,

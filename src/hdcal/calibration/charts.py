@@ -6,16 +6,16 @@ import numpy as np
 
 from hdcal.calibration.check.charts import left_out
 from hdcal.data.loading import movement_words
+from hdcal.inference.force_model.residuals import Residuals
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residuals import Residuals
 from hdcal.prediction.bands.charts import (
     band_marks,
     branch_marks,
     branches,
 )
 from hdcal.prediction.bands.result import Bands
-from hdcal.report.axes import displacement_axis, load_axis
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.axes import displacement_axis, load_axis
+from hdcal.report.charts.chart_spec import (
     CYCLE,
     GREY,
     INK,

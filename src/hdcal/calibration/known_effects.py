@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from hdcal.data.case import Case
 from hdcal.errors import Finding, Findings
-from hdcal.inference.problem import MEMBER_SD
+from hdcal.inference.force_model.problem import MEMBER_SD
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS

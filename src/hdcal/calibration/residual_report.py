@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.calibration.charts import residual_chart
-from hdcal.inference.residuals import Residuals
-from hdcal.report.chart_spec import Chart
+from hdcal.inference.force_model.residuals import Residuals
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Item, Words, quantity
 from hdcal.report.result import Result
 

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.report.chart_spec import CYCLE, Band, Chart, Line, Mark, Panel, Points, Rule
+from hdcal.report.charts.chart_spec import (
+    CYCLE,
+    Band,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    Rule,
+)
 
 if TYPE_CHECKING:
     from hdcal.classical.fit import Polynomial

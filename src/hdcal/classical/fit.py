@@ -15,7 +15,7 @@ from hdcal.classical.charts import fit_chart
 from hdcal.data.case import Case, require_case, require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import INTERVAL, Draws, Interval, Item, Words, quantity
 from hdcal.report.result import Result
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.quantities import Quantities
-from hdcal.report.chart_spec import ORANGE, Chart, Panel, Points
+from hdcal.report.charts.chart_spec import ORANGE, Chart, Panel, Points
 
 if TYPE_CHECKING:
     from hdcal.comparison.compare import Compared

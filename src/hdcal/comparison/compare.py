@@ -11,7 +11,7 @@ from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.models import Models, joint_draws, models_of
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Count, Draws, Interval, Item, Probability, Words, quantity
 from hdcal.report.result import Result
 from hdcal.report.words import label

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdcal.report import chart_spec as spec
+from hdcal.report.charts import chart_spec as spec
 
 if TYPE_CHECKING:
     from hdcal.design.inverse_design import InverseDesign

@@ -18,7 +18,7 @@ from hdcal.data.records import Geometry
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.residuals import noise_warnings
+from hdcal.inference.force_model.residuals import noise_warnings
 from hdcal.physics.profile import peak_stress
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.conditions import Conditions

@@ -25,7 +25,7 @@ from hdcal.design.nearest_point import CLOSE, nearest_kept
 from hdcal.design.result import DesignResult, Stress, shared_fields
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.models import Models
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, Probability, quantity
 
 # A limit this many times larger or smaller than the force is a slip of the unit.

@@ -18,7 +18,7 @@ from hdcal.errors import Finding, Findings, InputError
 from hdcal.physics.profile import peak_stress
 from hdcal.prediction.models import Models
 from hdcal.prediction.sizes import SIZES
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Item
 
 PLACE = ["deformation_mm", "temperature_C"]

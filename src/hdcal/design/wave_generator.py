@@ -15,7 +15,7 @@ from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
 from hdcal.design.springs import Kept, Spring, SpringGap, judge_all, kept_at
 from hdcal.errors import Finding, InputError
 from hdcal.prediction.models import Models
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, quantity
 
 # Default range of the spring rate, relative to the stiffness of the gear.

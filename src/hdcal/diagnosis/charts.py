@@ -10,8 +10,8 @@ from hdcal.data.loading import movement_words
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.which import ALL, LIKELY, Cause, Which, either
 from hdcal.quantities import Quantities
-from hdcal.report.axes import displacement_axis, load_axis
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.axes import displacement_axis, load_axis
+from hdcal.report.charts.chart_spec import (
     BLUE,
     GREY,
     ORANGE,

@@ -9,7 +9,7 @@ from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
 from hdcal.exported import jit
-from hdcal.inference.noise_form import loop_cells
+from hdcal.inference.force_model.noise_form import loop_cells
 from hdcal.physics.history import load_cycle
 
 # Ends of the curve, as shares of the largest deformation.

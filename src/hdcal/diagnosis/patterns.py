@@ -17,13 +17,13 @@ from hdcal.diagnosis.contrasts import Contrast, contrasts
 from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.base_model import moments
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.inference.residual_shapes import (
+from hdcal.inference.force_model.residual_shapes import (
     Correlated,
     Structure,
     Whitened,
     find_structure,
 )
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.report.item import INTERVAL, Interval, Item, Probability, Words
 from hdcal.report.words import load
 

@@ -13,7 +13,7 @@ from hdcal.diagnosis.patterns import Seen
 from hdcal.diagnosis.which import Cause, Which, share_words
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,
     Count,

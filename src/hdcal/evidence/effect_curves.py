@@ -7,7 +7,11 @@ import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.exported import jit
-from hdcal.inference.padding import bucket_size, pad_records, repeat_last_row
+from hdcal.inference.force_model.padding import (
+    bucket_size,
+    pad_records,
+    repeat_last_row,
+)
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 

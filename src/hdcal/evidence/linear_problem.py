@@ -27,9 +27,11 @@ from hdcal.evidence.base_model import (
 )
 from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.row_features import take_rows, tolerance_functions
-from hdcal.inference import distributions, serial_correlation
-from hdcal.inference.noise_form import pilot_fit
-from hdcal.inference.problem import case_reading, problem_priors
+from hdcal.inference import distributions
+from hdcal.inference.force_model import serial_correlation
+from hdcal.inference.force_model.noise_form import pilot_fit
+from hdcal.inference.force_model.priors import problem_priors
+from hdcal.inference.force_model.problem import case_reading
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.effect import Effect
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.evidence.items import Amplitudes
-from hdcal.inference.likelihood import log_interval
+from hdcal.inference.force_model.likelihood import log_interval
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
 _NODES, _WEIGHTS = np.polynomial.hermite.hermgauss(5)

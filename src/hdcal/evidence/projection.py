@@ -11,7 +11,7 @@ from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.marginal import Marginal, Products, log_marginal
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Context
-from hdcal.inference.serial_correlation import log_volume
+from hdcal.inference.force_model.serial_correlation import log_volume
 
 
 class Block(NamedTuple):

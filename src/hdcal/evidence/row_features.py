@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
-from hdcal.inference.noise_form import pilot_fit
+from hdcal.inference.force_model.noise_form import pilot_fit
 
 # Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
 MOST_ROWS = 10_000

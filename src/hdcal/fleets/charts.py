@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.report.axes import displacement_axis, load_axis
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.axes import displacement_axis, load_axis
+from hdcal.report.charts.chart_spec import (
     BLUE,
     CYCLE,
     GREY,

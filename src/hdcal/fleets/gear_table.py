@@ -35,7 +35,7 @@ class Flagged(Item):
     bend_N: float | None = quantity("bend", "N")
 
 
-class LeftOut(Item):
+class GearLeftOut(Item):
     """A gear that is in none of the numbers."""
 
     gear: Words
@@ -118,13 +118,15 @@ def false_discovery_rate(table: pd.DataFrame) -> float | None:
     return float(rate.mean()) if rate.size else None
 
 
-def gears_left_out(readings: FleetReadings) -> tuple[LeftOut, ...]:
+def gears_left_out(readings: FleetReadings) -> tuple[GearLeftOut, ...]:
     """Return the gears that were left out, each with the reason."""
     each = readings.case.left_out.items()
-    return tuple(LeftOut(gear=gear, why=cause(why)) for gear, why in each)
+    return tuple(GearLeftOut(gear=gear, why=cause(why)) for gear, why in each)
 
 
-def with_left_out(table: pd.DataFrame, left_out: tuple[LeftOut, ...]) -> pd.DataFrame:
+def with_left_out(
+    table: pd.DataFrame, left_out: tuple[GearLeftOut, ...]
+) -> pd.DataFrame:
     """Return the table with gears that were left out below the others."""
     if not left_out:
         return table

@@ -52,7 +52,7 @@ class Dated:
         return cls(day[order], gear[order], value, sd, _alone(odd[order]))
 
 
-class Step(Item):
+class LevelChange(Item):
     """A step between two dates, given the other steps; 95 % intervals."""
 
     after: Date
@@ -91,7 +91,7 @@ class Change(Item):
     changed: bool
     ways: dict[Way, Probability]
     likeliest: Way
-    steps: tuple[Step, ...]
+    steps: tuple[LevelChange, ...]
     drift: Interval
     days_sd: float
     left_out: tuple[Words, ...]
@@ -188,7 +188,7 @@ def _change(what, unit: str, values: Dated) -> Change:
         ways=ways,
         likeliest=max(ways, key=ways.__getitem__),
         steps=tuple(
-            Step(
+            LevelChange(
                 after=str(days[step.before]),
                 before=str(days[step.after]),
                 size=_interval(step.size),

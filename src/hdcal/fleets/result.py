@@ -20,16 +20,17 @@ from hdcal.fleets.charts import (
     time_chart,
 )
 from hdcal.fleets.gauge import GaugeRR
-from hdcal.fleets.gear_table import Flagged, LeftOut, with_left_out
+from hdcal.fleets.gear_table import Flagged, GearLeftOut, with_left_out
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
 from hdcal.fleets.model.groups import linked_rigs
 from hdcal.fleets.model.population import FittedFleet
-from hdcal.fleets.model.quantities import FleetGroups, population_priors
+from hdcal.fleets.model.priors import population_priors
+from hdcal.fleets.model.quantities import FleetGroups
 from hdcal.fleets.next_gear import NextForce, NextGear
 from hdcal.fleets.over_time import Change
 from hdcal.fleets.posterior import FleetPosterior
 from hdcal.fleets.reading.readings import FleetReadings
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,
     Count,
@@ -128,7 +129,7 @@ class Fleet(Result):
     name: Words
     gears: Count
     rows: Count
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[GearLeftOut, ...]
     flagged: tuple[Flagged, ...]
     least_probability_off: Probability = 1.0 - MOST_FALSE
     false_discovery_rate: Probability | None

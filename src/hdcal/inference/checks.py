@@ -13,7 +13,7 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, MAX_TREE_DEPTH, Mixing
 from hdcal.inference.distributions import frozen
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 
 if TYPE_CHECKING:
     from hdcal.inference.sample import Draws

@@ -16,6 +16,8 @@ from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Convergence
+from hdcal.inference.force_model.problem import Problem, build_problem
+from hdcal.inference.force_model.structure import ModelStructure
 from hdcal.inference.posterior_file import (
     CALIBRATION,
     content,
@@ -30,8 +32,6 @@ from hdcal.inference.posterior_tree import (
     restore_priors,
     to_json,
 )
-from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.structure import ModelStructure
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 

@@ -17,8 +17,8 @@ from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.exported import jit
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_TREE_DEPTH, have_mixed
+from hdcal.inference.force_model.marginal import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
-from hdcal.inference.marginal import draw_members
 from hdcal.inference.sampled_problem import Sampled
 
 # Called with (iterations done, iterations in all).

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.chart_spec import (
     ORANGE,
     Band,
     Chart,

@@ -11,12 +11,12 @@ from scipy.special import chdtrc
 from hdcal.data.case import Case, Theory, require_case, require_force
 from hdcal.errors import Finding, Findings
 from hdcal.exported import jit
-from hdcal.inference.assembly import (
+from hdcal.inference.checks import Check
+from hdcal.inference.force_model.assembly import (
     MOST_LOG_LIKELIHOODS,
     assemble,
     run_settings,
 )
-from hdcal.inference.checks import Check
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.motion.dynamic_problem import (
     DynamicPosterior,

@@ -19,19 +19,14 @@ from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.model import sample_site, sample_stiffness
-from hdcal.inference.padding import measured, pad_records
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.model import sample_site, sample_stiffness
+from hdcal.inference.force_model.padding import measured, pad_records
+from hdcal.inference.force_model.priors import influence_prior, unit_stiffness
+from hdcal.inference.force_model.problem import Problem, case_reading, without_texts
+from hdcal.inference.force_model.values import Values, where_read, with_gains
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import (
-    Problem,
-    case_reading,
-    influence_prior,
-    unit_stiffness,
-    without_texts,
-)
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.values import Values, where_read, with_gains
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.linear_response import LinearGear, linear_response
 

@@ -16,8 +16,8 @@ from hdcal.motion.dynamic_problem import (
     DynamicProblem,
     predict_motion,
 )
-from hdcal.report.chart_spec import Chart
-from hdcal.report.draws_charts import prior_chart, rank_chart
+from hdcal.report.charts.chart_spec import Chart
+from hdcal.report.charts.draws_charts import prior_chart, rank_chart
 from hdcal.report.item import Interval, Words, quantity
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hdcal.errors import InputError
-from hdcal.inference.problem import MEMBERS, without_scatter
-from hdcal.inference.values import Values
+from hdcal.inference.force_model.priors import without_scatter
+from hdcal.inference.force_model.problem import MEMBERS
+from hdcal.inference.force_model.values import Values
 from hdcal.physics.theory import Scalar
 from hdcal.prediction import conditions
 from hdcal.prediction.joint import joint

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.errors import NotUsable
 from hdcal.exported import jit
-from hdcal.inference.problem import case_reading
+from hdcal.inference.force_model.problem import case_reading
 from hdcal.motion.drive import Drive
 from hdcal.motion.gear_force import CalibratedGears, leftover_force
 from hdcal.physics.chain import Base

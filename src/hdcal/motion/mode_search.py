@@ -15,8 +15,8 @@ from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.distributions import frozen, moments
+from hdcal.inference.force_model.padding import measured
 from hdcal.inference.laplace import Whitening
-from hdcal.inference.padding import measured
 from hdcal.motion.dynamic_problem import DynamicProblem, stiffness_shares
 from hdcal.physics.linear_response import fit_linear
 

@@ -16,14 +16,14 @@ from hdcal.data.case import require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.problem import case_reading
+from hdcal.inference.force_model.problem import case_reading
 from hdcal.motion.charts import response_chart
 from hdcal.motion.drive import Drive, Force, make_drive
 from hdcal.motion.dynamic_problem import mass_prior
 from hdcal.motion.gear_force import CalibratedGears, Models
 from hdcal.motion.integration import integrate_all
 from hdcal.physics.dynamics import acting, damping_ratio, natural_frequency
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import INTERVAL, TAILS, Count, Interval, Item, Words, quantity
 from hdcal.report.provenance import gear_rows
 from hdcal.report.result import Result

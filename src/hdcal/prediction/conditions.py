@@ -12,7 +12,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Records
 from hdcal.errors import Finding
-from hdcal.inference.values import Values
+from hdcal.inference.force_model.values import Values
 from hdcal.prediction.forces import Quantity
 
 Direction = Literal["up", "down"]

@@ -14,11 +14,11 @@ from scipy.special import softmax
 
 from hdcal.data.records import Records
 from hdcal.exported import jit
-from hdcal.inference.likelihood import row_precision
-from hdcal.inference.padding import pad_records
+from hdcal.inference.force_model.likelihood import row_precision
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.values import Values, predict_rows, with_rounding
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
-from hdcal.inference.values import Values, predict_rows, with_rounding
 
 # Sizes of the bend as shares of the force range, sds of noise as shares of that of the
 # residuals. A size above ORDINARY is less probable: in the prior tables the stiffness

@@ -10,8 +10,14 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference.problem import Problem
-from hdcal.inference.values import Values, acting, build_effects, member_base, shown
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.values import (
+    Values,
+    acting,
+    build_effects,
+    member_base,
+    shown,
+)
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 

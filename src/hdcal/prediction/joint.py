@@ -10,8 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from hdcal.inference.problem import Problem, build_problem, without_scatter
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.force_model.priors import without_scatter
+from hdcal.inference.force_model.problem import Problem, build_problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.models import Model, Models, models_of
 

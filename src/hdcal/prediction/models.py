@@ -8,9 +8,9 @@ from typing import Literal, Protocol
 import numpy as np
 
 from hdcal.errors import Finding, InputError
+from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
 from hdcal.physics.effect import Effect
 from hdcal.prediction.extrapolation import Bend, fit_bends
 from hdcal.report.words import hypothesis, percent

@@ -3,7 +3,7 @@
 from typing import Literal, get_args
 
 from hdcal.errors import Finding
-from hdcal.inference.problem import Problem
+from hdcal.inference.force_model.problem import Problem
 
 Population = Literal["readings", "mountings", "specimens"]
 POPULATIONS: tuple[Population, ...] = get_args(Population)

@@ -16,7 +16,7 @@ from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
 from hdcal.inference.distributions import moments
-from hdcal.inference.values import Values
+from hdcal.inference.force_model.values import Values
 from hdcal.prediction.conditions import Conditions, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
 from hdcal.prediction.members import Members, joined

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from hdcal.report.chart_browser import chart_json
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_browser import chart_json
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.markdown import folded, html, parsed
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def notebook_html(result: "Result") -> str:
 
 
 def _drawn(charts: Mapping[str, Chart]) -> dict[str, bytes]:
-    from hdcal.report.chart_drawing import images
+    from hdcal.report.charts.chart_drawing import images
 
     return {
         name: images(chart, kinds=("svg",))["svg"] for name, chart in charts.items()

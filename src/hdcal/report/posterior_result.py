@@ -22,7 +22,7 @@ _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
 
 
-class Sampling(Item):
+class SamplerSettings(Item):
     """How the draws were sampled."""
 
     chains: Annotated[int, Field(ge=2)]
@@ -80,7 +80,7 @@ class PosteriorResult(Result):
     interval: float = Field(default=INTERVAL, gt=0.0, lt=1.0)
     interval_kind: str = "equal-tailed credible interval"
     checks: tuple[Check, ...] = Field(min_length=1)
-    sampling: Sampling
+    sampling: SamplerSettings
     seed: Count
     versions: dict[str, str] = Field(json_schema_extra={"required": ["hdcal"]})
     gear: CalibratedGear
@@ -149,7 +149,7 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
         "stiffness_N_per_mm": Interval.of(posterior.draws["stiffness"]),
         "flat_directions": tuple(c.words for c in checks if c.outcome == "note"),
         "checks": checks,
-        "sampling": Sampling(**sampling, divergences=int(diverging.sum())),
+        "sampling": SamplerSettings(**sampling, divergences=int(diverging.sum())),
         "seed": settings["seed"],
         "versions": settings["versions"],
         "gear": CalibratedGear(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from pydantic import ConfigDict, Field, InstanceOf, computed_field
 
 from hdcal.quantities import FORCE, Quantities
-from hdcal.report.chart_spec import RED, Chart
+from hdcal.report.charts.chart_spec import RED, Chart
 from hdcal.report.item import Item, Words, with_units
 from hdcal.report.result_schema import DIALECT, ResultSchema, schema_with_units
 from hdcal.report.sentences import rendered
@@ -168,7 +168,7 @@ class Result(Item):
         Raises:
             NotImplementedError: the result has no chart.
         """
-        from hdcal.report.chart_drawing import axes_or_new, draw_panel
+        from hdcal.report.charts.chart_drawing import axes_or_new, draw_panel
 
         for chart in self.charts().values():
             axes = draw_panel(chart.panels[0], axes_or_new(ax))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
-from hdcal.report.chart_drawing import images
+from hdcal.report.charts.chart_drawing import images
 from hdcal.report.page import html_page
 from hdcal.report.result import Result
 from hdcal.report.table_files import columns_csv

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.inference.checks import Check
-from hdcal.report.chart_spec import ORANGE, Bars, Chart, Panel, Points
+from hdcal.report.charts.chart_spec import ORANGE, Bars, Chart, Panel, Points
 from hdcal.report.item import (
     INTERVAL,
     Count,

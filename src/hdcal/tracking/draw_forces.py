@@ -12,11 +12,11 @@ from jaxtyping import Float
 from hdcal.data.case import Case
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
-from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.distributions import moments
-from hdcal.inference.problem import Problem
-from hdcal.inference.residuals import noise_warnings
-from hdcal.inference.values import Values, as_read
+from hdcal.inference.force_model.discrepancy import Discrepancy
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.residuals import noise_warnings
+from hdcal.inference.force_model.values import Values, as_read
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.prediction.joint import join
 from hdcal.prediction.models import Model, Models, averaging_words, models_of

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import digamma
 
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.tracking.bank import CELLS, Bank
 from hdcal.tracking.draw_forces import MOUNTING, StreamDraws
 

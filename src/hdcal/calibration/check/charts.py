@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.report.axes import displacement_axis
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.axes import displacement_axis
+from hdcal.report.charts.chart_spec import (
     CYCLE,
     GREEN,
     GREY,

@@ -17,7 +17,7 @@ from hdcal.data.records import Array, less_run_means
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Count, Digest, EffectName, Item, Words, quantity
 from hdcal.report.result import Result
 from hdcal.report.sentences import rendered
@@ -95,7 +95,7 @@ class Specimen(Item):
     stiffness_N_per_mm: float = quantity("stiffness as read", "N/mm")
 
 
-class Check(Result):
+class CaseCheck(Result):
     """What was read of a case.
 
     Attributes:
@@ -156,7 +156,7 @@ class Check(Result):
         return {"readings": readings_chart(self.case)}
 
 
-def check(case: Case, *, each_effect: bool = False) -> Check:
+def check(case: Case, *, each_effect: bool = False) -> CaseCheck:
     """Return what was read of a case.
 
     Args:
@@ -168,7 +168,7 @@ def check(case: Case, *, each_effect: bool = False) -> Check:
         name: tuple(sorted(effect.needs - records.known))
         for name, effect in EFFECTS.items()
     }
-    return Check(
+    return CaseCheck(
         name=case.name,
         gear=CheckedGear(
             name=gear.name,
@@ -204,7 +204,7 @@ def _certificates(case: Case) -> tuple[StatedError, ...]:
             standard_uncertainty=float(stated[name].numbers[1]) * UNITS[name][1],
             unit=UNITS[name][0],
             certificate=stated[name].source,
-            words=rendered(Check.template, name, {}, plain=True).strip(),
+            words=rendered(CaseCheck.template, name, {}, plain=True).strip(),
         )
         for name, prior in priors.items()
         if is_stated(prior)

@@ -73,7 +73,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
             path.write_text(_gear_file(case), "utf-8")
         console.words(f"the gear file: {write_gear}. Complete it")
     if plot:
-        from hdcal.report.chart_drawing import images
+        from hdcal.report.charts.chart_drawing import images
 
         (picture,) = images(found.charts()["readings"], case.name, [kind]).values()
         with places[plot].filled() as path:

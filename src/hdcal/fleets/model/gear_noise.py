@@ -18,9 +18,9 @@ from jaxtyping import Float
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.exported import jit
-from hdcal.fleets.model.gear_quantity import Noise, off_probability
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.model import sample_site
+from hdcal.fleets.model.gear_quantity import NoiseNodes, off_probability
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 
 # Nodes about the mode: places in standard deviations, and weights.
@@ -128,7 +128,7 @@ def _moments(problem: GearNoise, values: Mapping):
 
 def gear_noise(
     problem: GearNoise, values: Mapping
-) -> tuple[Noise, np.ndarray, np.ndarray]:
+) -> tuple[NoiseNodes, np.ndarray, np.ndarray]:
     """Return the noise of each gear, averaged over draws of the population.
 
     Args:
@@ -141,4 +141,4 @@ def gear_noise(
     """
     middle, sd, off = _moments(problem, values)
     nodes = jnp.exp(middle[:, None] + sd[:, None] * _PLACES)
-    return Noise(nodes, jnp.asarray(_LOG_WEIGHTS)), np.exp(middle), np.asarray(off)
+    return NoiseNodes(nodes, jnp.asarray(_LOG_WEIGHTS)), np.exp(middle), np.asarray(off)

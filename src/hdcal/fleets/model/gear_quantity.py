@@ -3,8 +3,8 @@
 A row of a gear holds y = m + a (θ + δ) + ε. θ of an ordinary gear is N(0, spread²),
 that of an odd gear is wider by √(1 + ratio²). δ ~ N(0, s σ²) is an error that all rows
 of a gear share, ε ~ N(0, c σ²) that of the row. σ is the noise of the readings of the
-gear; it is integrated over the nodes of `Noise`. Given σ and the kind of the gear all
-of it is Gaussian, so that a gear is integrated out exactly.
+gear; it is integrated over `NoiseNodes`. Given σ and the kind of the gear all of it is
+Gaussian, so that a gear is integrated out exactly.
 
 m = centre (1 + lot) (1 + rig) + operator. Of the stiffness θ and δ are shares: a = m;
 of any other quantity a = 1. Zeros scatter from row to row: ε then has spread² more, and
@@ -30,15 +30,15 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.fleets.model.groups import Grouping, group_offsets, sample_offsets
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.model import sample_site
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 
 # The local false-discovery rate up to which a gear is flagged: odds of three to one.
 MOST_FALSE = 0.25
 
 
-class Noise(eqx.Module):
+class NoiseNodes(eqx.Module):
     """Noise sd of the readings of each gear as nodes with weights.
 
     Attributes:
@@ -79,7 +79,7 @@ class GearQuantity(Sampled):
     operator: Int[Array, "g s"]
     shared: Float[Array, " g"]
     lot: Int[Array, " g"]
-    noise: Noise
+    noise: NoiseNodes
     groups: dict[str, Grouping]
     relative: Float[Array, ""]
     by_row: Float[Array, ""]

@@ -15,12 +15,8 @@ from hdcal.fleets.model.gear_noise import GearNoise, gear_noise
 from hdcal.fleets.model.gear_quantity import GearQuantity, draw_gears
 from hdcal.fleets.model.groups import group_offsets
 from hdcal.fleets.model.line_fits import line_fits
-from hdcal.fleets.model.quantities import (
-    FleetGroups,
-    Problems,
-    noise_problem,
-    population_priors,
-)
+from hdcal.fleets.model.priors import population_priors
+from hdcal.fleets.model.quantities import FleetGroups, Problems, noise_problem
 from hdcal.fleets.model.sampling import Sampling
 from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.fleets.reading.readings import FleetReadings

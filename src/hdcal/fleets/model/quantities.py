@@ -1,4 +1,4 @@
-"""Priors and data of the population of each quantity of the gears."""
+"""Population of each quantity of the gears, as a problem to sample."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,9 +7,8 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
-from hdcal.evidence.base_model import moments, stiffness_prior
 from hdcal.fleets.model.gear_noise import GearNoise
-from hdcal.fleets.model.gear_quantity import GearQuantity, Noise
+from hdcal.fleets.model.gear_quantity import GearQuantity, NoiseNodes
 from hdcal.fleets.model.groups import (
     Grouping,
     distinguished,
@@ -18,36 +17,17 @@ from hdcal.fleets.model.groups import (
     robust_sd,
 )
 from hdcal.fleets.model.line_fits import LineFits
+from hdcal.fleets.model.priors import (
+    GROUP_RATIO,
+    NOISE_SPREAD,
+    ODD,
+    ODD_RATIO,
+    ODD_STIFFNESS,
+    shape_priors,
+)
 from hdcal.fleets.reading.mounting_sums import MountingSums
-from hdcal.inference.problem import problem_priors
 from hdcal.inference.sampled_problem import Sampled
 
-_JUDGED = "engineering judgement: "
-ODD_STIFFNESS = Prior("beta", (1.0, 9.0), "1", _JUDGED + "one gear in ten is odd")
-ODD = Prior("beta", (1.0, 99.0), "1", _JUDGED + "one gear in a hundred is odd")
-ODD_RATIO = Prior(
-    "lognormal",
-    (6.0, 0.7),
-    "1",
-    _JUDGED + "odd gears lie some six times as far out as ordinary ones",
-)
-NOISE_SPREAD = Prior(
-    "lognormal",
-    (0.1, 1.2),
-    "1",
-    _JUDGED + "the noise of gears on one rig differs by 1 to 100 %",
-)
-GROUP_RATIO = Prior(
-    "lognormal",
-    (0.7, 1.2),
-    "1",
-    _JUDGED + "lots scatter about as gears of one lot do, seldom a tenth of it or "
-    "seven times as far; zeros of operators as those of mountings, gains of rigs as "
-    "gears",
-)
-# Shares of the largest force: a loop or a bend of all gears, and how much gears differ,
-# by a factor of some four either way.
-_SHAPE, _SHAPE_SPREAD, _SHAPE_LOG_SD = 0.05, 0.005, 1.4
 # Least relative scatter that is noticeable.
 _LEAST = 1e-4
 # Sds from the centre at which few ordinary gears are.
@@ -98,31 +78,6 @@ class FleetGroups:
         return cls(lots, lot, *each)
 
 
-def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
-    """Return the stiffness at K = 1 [N/mm as read], and the priors of a population."""
-    own = problem_priors(case, (), {}, case.gear.theory)
-    half = 0.5 if case.gear.reading == "diametral" else 1.0
-    log_mean, log_sd, nominal = stiffness_prior(case, own)
-    centre = half * float(np.exp(log_mean))
-    zero, gauge_sd = moments(own, "force_offset")
-    contact, contact_sd = moments(own, "deformation_offset")
-    zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
-    return half * nominal, {
-        "stiffness": Prior("lognormal", (centre, log_sd)),
-        "zero": Prior("normal", (zero - centre * contact, zero_sd)),
-        **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
-    }
-
-
-def shape_priors(largest_force: float) -> tuple[Prior, Prior]:
-    """Return the priors of the loop or bend of all gears, and of its scatter [N]."""
-    scatter = _SHAPE_SPREAD * largest_force
-    return (
-        Prior("normal", (0.0, _SHAPE * largest_force)),
-        Prior("lognormal", (scatter, _SHAPE_LOG_SD)),
-    )
-
-
 def noise_problem(
     fits: LineFits, priors: Mapping[str, Prior]
 ) -> tuple[GearNoise, dict[str, float]]:
@@ -151,7 +106,7 @@ class Problems:
     def __init__(
         self,
         groups: FleetGroups,
-        noise: Noise,
+        noise: NoiseNodes,
         noise_sd: np.ndarray,
         priors: Mapping[str, Prior],
         slots: int,

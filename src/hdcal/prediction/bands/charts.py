@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.loading import loading_side, movement_words
-from hdcal.report.axes import load_axis
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.axes import load_axis
+from hdcal.report.charts.chart_spec import (
     Band,
     Chart,
     Dash,

@@ -8,7 +8,7 @@ import pandas as pd
 from pydantic import Field, computed_field
 
 from hdcal.prediction.bands.charts import bands_chart
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Draws, Interval, Probability, quantity
 from hdcal.report.result import Result
 

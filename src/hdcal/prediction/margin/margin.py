@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.theory_names import SPRING
-from hdcal.inference.residuals import noise_warnings
+from hdcal.inference.force_model.residuals import noise_warnings
 from hdcal.prediction.conditions import (
     Conditions,
     Direction,

@@ -13,7 +13,7 @@ from hdcal.prediction.margin.budget import BudgetRow
 from hdcal.prediction.margin.charts import budget_chart, force_chart
 from hdcal.prediction.margin.decision import Conformity
 from hdcal.prediction.population import Population
-from hdcal.report.chart_spec import Chart
+from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Count, Interval, Item, Probability, Words
 from hdcal.report.item import quantity as labelled
 from hdcal.report.provenance import data_rows, gear_rows

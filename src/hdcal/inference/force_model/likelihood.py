@@ -13,12 +13,12 @@ from scipy import special
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
 from hdcal.inference.distributions import distribution
-from hdcal.inference.marginal import linear_part
-from hdcal.inference.padding import measured
-from hdcal.inference.problem import Problem
+from hdcal.inference.force_model.marginal import linear_part
+from hdcal.inference.force_model.padding import measured
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
+from hdcal.inference.force_model.values import Values, predict_rows, with_rounding
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.physics.effect import Noise
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the

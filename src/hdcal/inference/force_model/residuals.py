@@ -11,13 +11,12 @@ from scipy.special import ndtr
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
-from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
-from hdcal.inference.identifiability import Linearisation, linearise
-from hdcal.inference.noise_form import growth_p_value
-from hdcal.inference.padding import pad_records
-from hdcal.inference.posterior import Posterior
-from hdcal.inference.residual_shapes import (
+from hdcal.inference.force_model.discrepancy import discrepancy_columns
+from hdcal.inference.force_model.identifiability import Linearisation, linearise
+from hdcal.inference.force_model.noise_form import growth_p_value
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.residual_shapes import (
     FALSE_ALARM,
     Correlated,
     Structure,
@@ -26,8 +25,13 @@ from hdcal.inference.residual_shapes import (
     orthonormal,
     shapes_of,
 )
-from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
-from hdcal.inference.values import predict_rows
+from hdcal.inference.force_model.serial_correlation import (
+    CORRELATION,
+    previous_rows,
+    whiten,
+)
+from hdcal.inference.force_model.values import predict_rows
+from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.quantities import FORCE, Quantities
 

@@ -12,15 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.inference.discrepancy import (
+from hdcal.inference.distributions import frozen
+from hdcal.inference.force_model.discrepancy import (
     BASIS_SIZE,
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.distributions import frozen
-from hdcal.inference.noise_form import Base, Pilot, base_model, pilot_fit
-from hdcal.inference.padding import pad_records
-from hdcal.inference.serial_correlation import (
+from hdcal.inference.force_model.noise_form import (
+    BaseForces,
+    Pilot,
+    base_model,
+    pilot_fit,
+)
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
     previous_rows,
     whitened_products,
@@ -108,7 +113,7 @@ def decide_structure(
     return ModelStructure(noise_sd, rounded, gap, correlated, reason)
 
 
-def _may_bend(case: Case, base: Base) -> bool:
+def _may_bend(case: Case, base: BaseForces) -> bool:
     """Return whether rows are enough, and a line misses one by more than its step."""
     if len(case.records.force) < _LEAST_ROWS_OF_A_GAP:
         return False
@@ -140,7 +145,7 @@ def _why_independent(case: Case, effects, rounded: bool) -> str:
 
 
 def _best_form(
-    case: Case, base: Base, gaps: tuple[bool, ...], choices: tuple[bool, ...]
+    case: Case, base: BaseForces, gaps: tuple[bool, ...], choices: tuple[bool, ...]
 ) -> tuple[bool, bool]:
     """Return whether there is a leftover and a correlation, of those considered."""
     forms = [(gap, correlated) for gap in gaps for correlated in choices]

@@ -14,11 +14,11 @@ from jax.nn import log_sigmoid, softplus
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
-from hdcal.inference.likelihood import log_likelihood
-from hdcal.inference.padding import measured
-from hdcal.inference.problem import Problem
-from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import stiffness, with_gains
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.padding import measured
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.serial_correlation import CORRELATION
+from hdcal.inference.force_model.values import stiffness, with_gains
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
 

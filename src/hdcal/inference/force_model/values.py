@@ -20,7 +20,7 @@ from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
 if TYPE_CHECKING:
-    from hdcal.inference.problem import Problem
+    from hdcal.inference.force_model.problem import Problem
 
 # Float scalars and arrays by site name.
 Values = Mapping[str, Any]

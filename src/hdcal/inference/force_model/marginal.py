@@ -19,11 +19,20 @@ from jaxtyping import Float, Int, Key
 from scipy.linalg import helmert
 
 from hdcal.data.records import Array
-from hdcal.inference.padding import measured
-from hdcal.inference.problem import MEMBER_SD, MEMBERS, Problem
+from hdcal.inference.force_model.padding import measured
+from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
+from hdcal.inference.force_model.serial_correlation import (
+    CORRELATION,
+    log_volume,
+    whiten,
+)
+from hdcal.inference.force_model.values import (
+    Values,
+    member_base,
+    predict_rows,
+    with_rounding,
+)
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import CORRELATION, log_volume, whiten
-from hdcal.inference.values import Values, member_base, predict_rows, with_rounding
 from hdcal.physics.chain import linear_coefficients
 
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.

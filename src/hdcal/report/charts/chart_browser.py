@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.chart_spec import (
     Band,
     Bars,
     Chart,

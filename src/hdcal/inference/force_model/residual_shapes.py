@@ -9,7 +9,7 @@ from scipy import special
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
-from hdcal.inference.serial_correlation import whitened_products
+from hdcal.inference.force_model.serial_correlation import whitened_products
 
 # Family-wise probability that a shape is found in pure noise.
 FALSE_ALARM = 0.01

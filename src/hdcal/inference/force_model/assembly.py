@@ -13,16 +13,16 @@ from hdcal.data.priors import Prior
 from hdcal.exported import jit
 from hdcal.inference.checks import Check, bound_check, conflict_check, sampling_checks
 from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
-from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
-from hdcal.inference.identifiability import identification_checks
-from hdcal.inference.likelihood import densities, pointwise_log_likelihood
-from hdcal.inference.padding import pad_records
+from hdcal.inference.force_model.discrepancy import discrepancy_columns
+from hdcal.inference.force_model.identifiability import identification_checks
+from hdcal.inference.force_model.likelihood import densities, pointwise_log_likelihood
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.serial_correlation import previous_rows
 from hdcal.inference.posterior_tree import data_groups, dataset, units_in
-from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import previous_rows
 from hdcal.versions import versions
 
 _PRIOR_DRAWS = 2000

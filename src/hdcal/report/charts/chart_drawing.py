@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 
-from hdcal.report.canvas import heading, plain, render, style, watermark
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.canvas import heading, plain, render, style, watermark
+from hdcal.report.charts.chart_spec import (
     Band,
     Bars,
     Chart,

@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference.padding import pad_records
+from hdcal.inference.force_model.padding import pad_records
 from hdcal.physics.effect import Effect
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the

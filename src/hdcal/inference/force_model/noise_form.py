@@ -10,8 +10,8 @@ from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
 from hdcal.data.scatter import left_of_lines
 from hdcal.exported import jit
-from hdcal.inference.padding import pad_records
-from hdcal.inference.serial_correlation import previous_rows, whiten
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.serial_correlation import previous_rows, whiten
 from hdcal.physics.history import stop_cells
 
 # Fewer rows do not show how their noise depends on anything.
@@ -41,7 +41,7 @@ class Pilot(NamedTuple):
     noise_sd: float
 
 
-class Base(NamedTuple):
+class BaseForces(NamedTuple):
     """The base model of least squares.
 
     Attributes:
@@ -60,7 +60,7 @@ class Base(NamedTuple):
         return self.force - self.columns @ (self.columns.T @ self.force)
 
 
-def base_model(records: Records, shapes: str = "line") -> Base:
+def base_model(records: Records, shapes: str = "line") -> BaseForces:
     """Return the columns of a line for each specimen with a zero for each run.
 
     Args:
@@ -102,7 +102,7 @@ def base_model(records: Records, shapes: str = "line") -> Base:
     table = np.reshape(columns, (-1, len(force))).T
     left, strength, _ = np.linalg.svd(table, full_matrices=False)
     kept = left[:, strength > 1e-10 * strength.max(initial=0.0)]
-    return Base(kept, force, taken)
+    return BaseForces(kept, force, taken)
 
 
 def pilot_fit(records: Records, shapes: str = "bend") -> Pilot:

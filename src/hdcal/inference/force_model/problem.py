@@ -10,29 +10,29 @@ from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import is_stated
-from hdcal.data.prior import Prior, scaled
-from hdcal.data.priors import SCALE_UNITS
+from hdcal.data.prior import Prior
 from hdcal.data.records import Array, Records, lies_far
-from hdcal.data.theory_names import SPRING, Theory
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.data.theory_names import Theory
+from hdcal.errors import Finding, Findings
 from hdcal.exported import jit
-from hdcal.inference.compression import CompressedRows, compress
-from hdcal.inference.discrepancy import (
+from hdcal.inference.force_model.compression import CompressedRows, compress
+from hdcal.inference.force_model.discrepancy import (
     Discrepancy,
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.padding import pad_records
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.priors import (
+    problem_priors,
+    unit_stiffness,
+    without_scatter,
+)
+from hdcal.inference.force_model.serial_correlation import previous_rows
+from hdcal.inference.force_model.structure import ModelStructure, decide_structure
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import previous_rows
-from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.physics.chain import Reading, linear_columns
-from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.effects.scatter import Scatter
-from hdcal.physics.theory import THEORIES
+from hdcal.physics.effect import Effect
 
-# Parameters that every model has.
-SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
 # Parameters that come in numbers: the site of each kind, and the site of the spread of
 # those that are labels in the data.
 MEMBERS = {
@@ -118,7 +118,7 @@ class Problem(Sampled):
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
-        from hdcal.inference.model import declare
+        from hdcal.inference.force_model.model import declare
 
         declare(self)
 
@@ -135,74 +135,6 @@ def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
         name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
         for name, prior in priors.items()
     }
-
-
-def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Return the effects that have sites.
-
-    Effects of scatter have none: wherever there are two runs or specimens these are
-    members of the model, with the priors `run_offset_sd` and `specimen_sd`.
-    """
-    return tuple(effect for effect in effects if not issubclass(effect, Scatter))
-
-
-def problem_priors(
-    case: Case,
-    effects: Sequence[type[Effect]],
-    shipped: Mapping[str, Prior],
-    theory: Theory,
-) -> dict[str, Prior]:
-    """Return the priors of every site, K carried over to the theory in use.
-
-    Args:
-        case: gear, whose stated priors win.
-        effects: in the model.
-        shipped: priors of every effect in the library.
-        theory: which stiffness K multiplies.
-
-    Raises:
-        InputError: an effect's parameter has no prior.
-    """
-    gear = case.gear
-    table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
-    table |= gear.gauge_priors
-    names = [*SITES, *SCALE_UNITS, *gear.gauge_priors]
-    for effect in without_scatter(effects):
-        names += [f"{effect.name}.{field}" for field in parameters(effect)]
-    missing = [name for name in names if name not in table]
-    if missing:
-        raise InputError(
-            Finding(
-                case.name,
-                f"no prior for {name}",
-                f"add it to the gear file's [priors], e.g. {name} = "
-                '{ family = "normal", mean = 0.0, sd = 1.0 }',
-            )
-            for name in missing
-        )
-    priors = {name: table[name] for name in names}
-    priors["K"] = influence_prior(case, theory)
-    return priors
-
-
-def influence_prior(case: Case, theory: Theory) -> Prior:
-    """Return the prior of K carried over to a theory: K_a k_a = K_b k_b.
-
-    Raises:
-        InputError: one theory is `spring`, which has another modulus.
-    """
-    gear = case.gear
-    if (theory == SPRING) != (gear.K_theory == SPRING):
-        words = f"the gear was read with '{gear.theory}', whose K is no K of '{theory}'"
-        remedy = f"read the gear with the theory '{theory}'"
-        raise InputError([Finding("theory", words, remedy)])
-    ratio = unit_stiffness(case, gear.K_theory) / unit_stiffness(case, theory)
-    return scaled(gear.priors["K"], ratio)
-
-
-def unit_stiffness(case: Case, theory: Theory) -> float:
-    """Return k_theory/E of the case's gear, radial [mm]."""
-    return float(THEORIES[theory](case.gear.geometry, 1.0))
 
 
 def build_problem(
@@ -275,7 +207,7 @@ def build_problem(
         far=lies_far(records),
     )
     # Late: it imports this module.
-    from hdcal.inference.identifiability import resolved_units
+    from hdcal.inference.force_model.identifiability import resolved_units
 
     units = resolved_units(problem, records, base, form.noise_sd)
     return replace(problem, units=units)

@@ -10,7 +10,7 @@ from scipy.stats import rankdata
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
-from hdcal.report.chart_spec import (
+from hdcal.report.charts.chart_spec import (
     BLUE,
     CYCLE,
     INK,

@@ -13,11 +13,11 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import Check, listed
-from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen, moments
-from hdcal.inference.padding import pad_records
-from hdcal.inference.problem import MEMBER_SD, MEMBERS, Problem
-from hdcal.inference.values import predict_rows
+from hdcal.inference.force_model.discrepancy import discrepancy_columns
+from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
+from hdcal.inference.force_model.values import predict_rows
 from hdcal.physics.effect import parameters
 
 # Parameters of the mean besides those of effects; sigma is not one of them.

@@ -1,0 +1,1 @@
+"""The force model as a problem of inference: noise, members, leftover."""

@@ -1,0 +1,1 @@
+"""Charts as declarations, and what draws them."""
