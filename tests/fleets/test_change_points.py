@@ -64,6 +64,13 @@ def test_the_size_of_a_drift_is_within_its_interval():
     assert np.mean(held) >= 0.88
 
 
+@pytest.mark.parametrize("many", [60, 200])
+def test_the_scatter_of_days_is_that_of_their_levels(many):
+    """With several values a day: fewer do not separate their scatter from that of days."""
+    found = [each.days_sd for each in repeated("days", many=many, size=2.5)]
+    assert np.mean(found) == pytest.approx(2.5, rel=0.1)
+
+
 def test_two_steps_are_distinguished():
     rng, held = np.random.default_rng(1), []
     for _ in range(30):

@@ -46,6 +46,10 @@ def one_place(x, force):
     x[:] = 0.3
 
 
+def at_zero(x, force):
+    x[:] = 0.0
+
+
 FAULTS = [
     (jump, "jump of the force"),
     (broken, "drop of the force for good"),
@@ -55,6 +59,7 @@ FAULTS = [
     (dead, "does not grow"),
     (opposite, "falls as the deformation grows"),
     (one_place, "one deformation only"),
+    (at_zero, "one deformation only"),
 ]
 
 

@@ -216,6 +216,18 @@ def test_what_data_and_priors_leave_open_is_listed(good):
     assert [words.split()[0] for words in found[1]] == ["alpha:"]
 
 
+def test_a_flat_direction_of_three_parameters_is_named():
+    """Any two of them are determined, the three together are not."""
+    rng = np.random.default_rng(3)
+    one, other = rng.normal(size=(2, 40))
+    slopes = {"a": one, "b": other, "c": one + other, "d": rng.normal(size=40)}
+    priors = {name: Prior("normal", (0.0, 1.0)) for name in slopes}
+    notes = [
+        c.words for c in identification_checks(slopes, priors) if c.outcome == "note"
+    ]
+    assert len(notes) == 1 and notes[0].startswith("a, b and c ")
+
+
 def test_parts_of_the_noise_have_no_slope_in_the_mean():
     chosen = (EFFECTS["heteroscedastic_noise"], EFFECTS["outliers"])
     case = ramp_case()

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from hdcal.data.gear_file.rig_facts import rows_of_half_cycle
 
-RUNS = 2000
+RUNS = 4000
 pytestmark = pytest.mark.thorough
 
 
@@ -55,13 +55,13 @@ def covered(rows: int, true: float, least: float = 3.0) -> float:
 
 @pytest.mark.parametrize("rows", [15, 60, 400])
 def test_independent_readings_have_the_interval_of_least_squares(rows):
-    # 2,000 runs determine a share to 0.5 %.
-    assert covered(rows, 0.0) == pytest.approx(0.95, abs=0.02)
+    # 4,000 runs know a share to 0.4 %.
+    assert covered(rows, 0.0) == pytest.approx(0.95, abs=0.015)
 
 
-@pytest.mark.parametrize(("rows", "true"), [(60, 0.7), (400, 0.9)])
+@pytest.mark.parametrize(("rows", "true"), [(60, 0.5), (60, 0.7), (400, 0.9)])
 def test_the_interval_allows_for_a_correlation_that_shows(rows, true):
-    assert covered(rows, true) == pytest.approx(0.95, abs=0.025)
+    assert covered(rows, true) == pytest.approx(0.95, abs=0.02)
     # By least squares it does not.
     assert covered(rows, true, least=np.inf) < 0.8
 

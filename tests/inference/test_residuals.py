@@ -26,6 +26,7 @@ from hdcal.inference.force_model.residual_shapes import (
 from hdcal.inference.force_model.residuals import (
     NEIGHBOURS,
     SCATTER,
+    WILD,
     noise_faults,
     residuals,
 )
@@ -282,3 +283,33 @@ def test_the_factor_is_that_of_the_intervals():
     found = calibration_of(posterior)
     assert NEIGHBOURS in [shape.name for shape in found.residuals]
     assert NEIGHBOURS in found.steps
+
+
+def test_a_slip_of_writing_is_named_by_its_reading():
+    rng = np.random.default_rng(8)
+    for rho in (0.0, 0.8):
+        error = correlated(rho, rng)
+        error[ROWS // 3] += 60.0
+        assert WILD in faults(error)
+        assert WILD not in faults(error, mixed=True)
+        error[ROWS // 3] -= 60.0
+        assert WILD not in faults(error)
+
+
+def test_noise_with_long_tails_is_seldom_a_slip():
+    rng = np.random.default_rng(9)
+    many = [WILD in faults(rng.standard_t(5, size=ROWS)) for _ in range(200)]
+    assert np.mean(many) <= 0.03
+
+
+def test_sizes_are_those_of_all_shapes_together():
+    """One odd run of five is two steps: each alone would be a third of its size."""
+    run, rng = np.repeat(np.arange(5), 30), np.random.default_rng(2)
+    error = 20.0 * (run == 2) + rng.normal(size=len(run))
+    steps = {str(k): (1.0 * (run >= k), "", "") for k in range(1, 5)}
+    data = Whitened(error, np.ones((len(run), 1)), steps)
+    found = {each.name: each for each in find_structure(data, np.ones(len(run)))}
+    assert {*found} == {"2", "3"}
+    assert found["2"].coefficient == pytest.approx(20.0, abs=1.0)
+    assert found["3"].coefficient == pytest.approx(-20.0, abs=1.0)
+    assert found["2"].error == pytest.approx(np.sqrt(1 / 60 + 1 / 30), rel=0.2)

@@ -14,7 +14,7 @@ from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
-from hdcal.inference.force_model.residuals import Residuals, residuals
+from hdcal.inference.force_model.residuals import WILD, Residuals, residuals
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.predict import default_bands
@@ -251,12 +251,14 @@ def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
     warned = {check.name for check in posterior.checks if check.outcome == "warning"}
     if PLAUSIBLE in warned:
         yield "implausible"
+    if WILD in [shape.name for shape in left.noise]:
+        yield WILD
     if "specimens" in known:
         yield "several specimens"
     if INDEPENDENT in warned and "unloading" in known:
         yield "strong correlation"
     yield from (shape.name for shape in left.structure)
-    yield from (shape.name for shape in left.noise)
+    yield from (shape.name for shape in left.noise if shape.name != WILD)
     if NOISY in warned and not left.structure:
         yield "much noise"
     yield from (f"no {name}" for name in _WANTED if name not in known)

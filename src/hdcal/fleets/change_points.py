@@ -115,12 +115,14 @@ def changes(
     prior = np.log([*WAYS.values()])
     ways = softmax(logsumexp(evidence, axis=1) + prior)
     of_steps, of_drift, of_days = softmax(evidence, axis=1)[1:]
-    levels = sums.posterior(ends[:-1], ends[1:])[0]
+    levels, errors = sums.posterior(ends[:-1], ends[1:])
+    # Levels scatter by what their means do and by what these are unsure by.
+    scatter = levels.var(axis=1, ddof=1) + errors.mean(axis=1)
     return Changes(
         ways=dict(zip(WAYS, ways.tolist(), strict=True)),
         steps=tuple(_steps(sums, of_steps, of_steps @ begins)),
         drift=_interval(of_drift, slope, slope_variance),
-        days_sd=float(np.sqrt(of_days @ levels.var(axis=1, ddof=1))),
+        days_sd=float(np.sqrt(of_days @ scatter)),
     )
 
 

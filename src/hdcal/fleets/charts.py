@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.fleets.reading.readings import modulus_left
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
     BLUE,
@@ -91,6 +92,7 @@ def curves_chart(fleet: "Fleet") -> Chart:
     ratio = fleet.readings.size_ratio
     slope = fleet.population.stiffness_N_per_mm.median
     line = slope * x * (1.0 if ratio is None else ratio[gear])
+    line *= modulus_left(case.gear, np.asarray(records.temperature))
     recorded = table.loc[np.unique(gear)]
     flagged = recorded[recorded["flagged"]]
     flagged = flagged.sort_values("probability_off", ascending=False, kind="stable")

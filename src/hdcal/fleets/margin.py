@@ -23,7 +23,7 @@ class FleetMargin(NextForce, Result):
     """The force of gears to come, from the population of a fleet.
 
     Attributes:
-        facts: gears, data and settings of the fleet.
+        fleet: its gears, data and settings.
     """
 
     template = "fleets/margin.md.j2"

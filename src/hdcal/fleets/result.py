@@ -67,7 +67,7 @@ class Population(Item):
         reading_sd_N: noise of the readings of ordinary gears.
         zero_N: mean zero.
         loop_N: force of loading above unloading, of ordinary gears.
-        bend_N: deviation of the middle of the curve from a straight line, likewise.
+        bend_N: how far the middle of the curve lies below the chord, likewise.
         correlation: of the noise of neighbouring readings.
     """
 

@@ -51,12 +51,6 @@ def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
 
 
 @jit
-def sites_at(problem: Sampled, position: Position) -> Position:
-    """Return the value of every sampled site at an unconstrained position."""
-    return constrain_fn(model, (problem,), {}, position)
-
-
-@jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)

@@ -16,8 +16,7 @@ from hdcal.data.measurements.gear_files import (
     gear_labels,
     not_read,
 )
-from hdcal.data.measurements.joining import joined as joined
-from hdcal.data.measurements.joining import labelled
+from hdcal.data.measurements.joining import joined, labelled
 from hdcal.data.measurements.measurements import Measurements, read_measurements
 from hdcal.data.reading import asked_columns, gear_of
 from hdcal.data.tables.headers import GROUPINGS
@@ -153,9 +152,15 @@ def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Find
         words = f"is {here}, and {there} in {base}"
         yield Finding(str(file), words, remedy, None, key)
     # Materials of one name may stand in several files.
-    if not keys and one.priors["E0"].numbers != other.priors["E0"].numbers:
+    if not keys and _material(one) != _material(other):
         words = f"its material is another one than in {base}"
         yield Finding(str(file), words, remedy, None, "gear.material")
+
+
+def _material(gear: Gear) -> list[tuple]:
+    """Return what a material decides: the priors of modulus and temperature loss."""
+    priors = [gear.priors[name] for name in ("E0", "alpha")]
+    return [(prior.family, prior.numbers) for prior in priors]
 
 
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:

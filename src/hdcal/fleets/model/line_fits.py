@@ -2,7 +2,8 @@
 
 A mounting holds sums of products of v = (x, sense, x|x|, y) about its mean. All lines
 of a gear on a rig have one slope and a zero for each mounting. The loop is the force
-of loading above unloading, the bend the deviation of the middle of the curve.
+of loading above unloading. The bend is how far the middle of the curve lies below the
+chord of its ends: it is positive where the gear stiffens.
 """
 
 from dataclasses import dataclass

@@ -22,6 +22,7 @@ from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import Check
 from hdcal.inference.sample import Progress
+from hdcal.report.item import TAILS
 
 # In the order in which they are sampled.
 QUANTITIES = ("noise", "stiffness", "zero", "loop", "bend")
@@ -48,7 +49,6 @@ _AVERAGED = 100
 # Draws of the population for which every gear is drawn too: more for few gears, up to
 # a million in all, and at most as many as memory holds.
 _GEAR_DRAWS, _IN_ALL, _MOST_DRAWN = 400, 1_000_000, 20_000_000
-_INTERVAL = (0.025, 0.5, 0.975)
 _SETTINGS = ("seed", "chains", "warmup", "draws")
 
 
@@ -168,9 +168,7 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         rigs=groups.rigs,
         unit=unit,
         checks=tuple(populations.checks),
-        settings={
-            n: getattr(sampling, n) for n in ("seed", "chains", "warmup", "draws")
-        },
+        settings={name: getattr(sampling, name) for name in _SETTINGS},
     )
 
 
@@ -192,7 +190,7 @@ def _stiffness(
     stiffness = values["centre"][:, None] * (1.0 + lots) * (1.0 + apart)
     columns = {"off_stiffness": np.asarray(drawn.off).mean(axis=0)}
     for name, draws in (("stiffness", stiffness), ("apart", 100.0 * apart)):
-        low, middle, high = np.quantile(draws, _INTERVAL, axis=0)
+        low, middle, high = np.quantile(draws, TAILS, axis=0)
         columns |= {name: middle, f"{name}_lo": low, f"{name}_hi": high}
     columns["apart_percent"] = columns.pop("apart")
     distance = np.median(apart / values["spread"][:, None], axis=0)

@@ -130,7 +130,8 @@ def _still(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
     moved = np.bincount(sums.gear, sums.products[:, 0, 0])
     place = np.bincount(sums.gear, sums.rows * sums.mean[:, 0] ** 2)
     name = readings.case.units.displacement
-    for gear in np.flatnonzero((moved <= _ROUNDING * place) & (place > 0.0)):
+    rows = np.bincount(sums.gear, sums.rows)
+    for gear in np.flatnonzero((moved <= _ROUNDING * place) & (rows > 0.0)):
         yield gear, f"it was read at one {name} only in each of its runs"
 
 

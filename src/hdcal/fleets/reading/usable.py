@@ -34,7 +34,7 @@ def usable(
         InputError: a gear has a fault and may not be left out, fewer than three are
             left, none scatters about its line, or the table cannot be read.
     """
-    if readings.checked:
+    if readings.checked and gears is None:
         return readings
     bad = dict(readings.faults)
     many = len({*readings.case.specimen_labels, *bad})
@@ -69,7 +69,7 @@ def _of_gears(bad: Mapping[str, Finding]) -> list[Finding]:
         for gear, why in bad.items()
     ]
     if more := len(each[LISTED:]):
-        words = f"and {more} more gears have a fault"
+        words = f"and {more} more gear{' has' if more == 1 else 's have'} a fault"
         each[LISTED:] = [Finding(each[0].file, words, "Correct these too")]
     return each
 

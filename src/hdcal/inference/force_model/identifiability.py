@@ -24,6 +24,8 @@ from hdcal.physics.effect import parameters
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
 # A parameter that moves the mean by fewer noise sds over its whole prior has no effect.
 _NO_EFFECT = 1e-3
+# Smallest share of a parameter in a flat direction that is named.
+_SHARE = 0.3
 
 
 @dataclass(frozen=True)
@@ -178,20 +180,18 @@ def identification_checks(
     )
     none = Check(seen, "passed", "each one changes the predicted readings")
     every = Check(apart, "passed", "no direction is left to the priors")
-    unseen = [
-        Check(
-            seen,
-            "note",
-            f"{name}: does not change these readings, the prior decides it",
-        )
-        for name in unseen
-    ]
-    flat = [Check(apart, "note", sentence) for sentence in flat]
-    return *(unseen or [none]), *(flat or [every])
+    without = "does not change these readings, the prior decides it"
+    no_effect = [Check(seen, "note", f"{name}: {without}") for name in unseen]
+    directions = [Check(apart, "note", sentence) for sentence in flat]
+    return *(no_effect or [none]), *(directions or [every])
 
 
 def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
-    """Return groups of parameters of which pairs have a flat direction."""
+    """Return groups of parameters that the readings cannot distinguish.
+
+    Pairs that have a flat direction come first, linked where they share a parameter;
+    then the flat directions beyond these, by the parameters with a share in them.
+    """
     names = [name for name in {**dict.fromkeys(_MEAN), **columns} if name in columns]
     if len(names) < 2:
         return []
@@ -205,4 +205,15 @@ def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
     groups = (
         [n for n, g in zip(names, group, strict=True) if g == i] for i in range(count)
     )
-    return [members for members in groups if len(members) > 1]
+    found = [members for members in groups if len(members) > 1]
+    # A row for each column, also with fewer readings than columns.
+    padded = np.vstack([few, np.zeros((len(names), len(names)))])
+    _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
+    named = sum(len(members) - 1 for members in found)
+    further = max(int(np.sum(strength < 1.0)) - named, 0)
+    for vector in vectors[::-1][:further]:
+        share = np.abs(vector) / np.abs(vector).max()
+        members = [n for n, part in zip(names, share, strict=True) if part >= _SHARE]
+        if len(members) > 2 and members not in found:
+            found.append(members)
+    return found

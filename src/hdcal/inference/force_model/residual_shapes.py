@@ -1,6 +1,6 @@
 """Shapes in residuals: a table of columns, and a t test of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -144,7 +144,7 @@ def find_structure(
 
     The clearest shape is taken first; the others are then tested on what it leaves,
     each at a family-wise error of `FALSE_ALARM`: Bonferroni over the shapes still
-    tried, in all searches.
+    tried, in all searches. The sizes are those of all found shapes together.
 
     Args:
         data: residuals, sensitivities and shapes.
@@ -172,7 +172,23 @@ def find_structure(
         size = best.coefficient / scale, best.error / scale
         structures.append(Structure(best.name, p, rms, words, *size))
         absorbed = np.column_stack([absorbed, column])
-    return tuple(structures)
+    if len(structures) < 2:
+        return tuple(structures)
+    return tuple(_with_others(data, each, structures, noise) for each in structures)
+
+
+def _with_others(
+    data: Whitened, one: Structure, every: list[Structure], noise: Correlated | None
+) -> Structure:
+    """Return a structure with its size beside all the others, where that is known."""
+    others = [data.shapes[each.name][0] for each in every if each is not one]
+    basis = orthonormal(np.column_stack([data.absorbed, *others]))
+    column = data.shapes[one.name][0]
+    for test in _tests(data.residual, {one.name: column}, basis, noise):
+        scale = float(test.remainder @ column)
+        size, error = test.coefficient / scale, test.error / scale
+        return replace(one, coefficient=size, error=error)
+    return one
 
 
 def orthonormal(absorbed: np.ndarray) -> np.ndarray:

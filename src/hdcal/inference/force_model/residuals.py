@@ -6,9 +6,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import ndtr, stdtr
 
 from hdcal.data.records import Records
+from hdcal.data.scatter import least_step
 from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.distributions import moments
@@ -35,12 +36,17 @@ from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.quantities import FORCE, Quantities
 
-NEIGHBOURS, SCATTER = "neighbours", "scatter"
-# Draws that the fitted reading is averaged over: its error is then a tenth of the
-# of the posterior.
+NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
+# Draws that the fitted reading is averaged over: its error is then a tenth of that of
+# the posterior.
 _DRAWS = 200
 # Fewer rows do not show the properties of their noise.
 _LEAST_ROWS = 12
+# A normal sd over the median of absolute errors, and the efficiency of that median.
+_NORMAL, _EFFICIENCY = 1.4826, 0.37
+# A wild reading lies so many sds off and has so large a share of all squares, and few
+# readings are wild: jumps of a rig are many, and noise may have long tails.
+_WILD, _SHARE, _FEW = 12.0, 0.02, 3
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,6 +103,7 @@ def residuals(posterior: Posterior) -> Residuals:
         records,
         near.sd,
         rounded=float(problem.step) > float(np.median(near.sd)),
+        mixed=any(effect.mixture for effect in posterior.effects),
         correlation=float(centre.get(CORRELATION, 0.0)),
     )
     return Residuals(
@@ -166,6 +173,7 @@ def noise_faults(
     sd: np.ndarray,
     *,
     rounded: bool,
+    mixed: bool = False,
     correlation: float = 0.0,
 ) -> tuple[Structure, ...]:
     """Return how residuals differ from the noise that the model has.
@@ -178,6 +186,7 @@ def noise_faults(
         sd: noise sd of each row [N].
         rounded: whether steps of the reading are wider than its noise; neighbours
             then err in the same way without any correlation.
+        mixed: whether the model expects wild readings.
         correlation: of neighbouring readings in the model [-].
     """
     if len(sd) < _LEAST_ROWS:
@@ -187,6 +196,9 @@ def noise_faults(
     # Squares of correlated errors come in waves, which pass for growth.
     left = _independent(data, before, correlation)
     tests = [_scatter(left, records, sd)]
+    if not (rounded or mixed):
+        added = sd * np.sqrt(1.0 - correlation**2 * follows)
+        tests.append(_wild(left, records, added))
     if not rounded and follows.any():
         tests.append(_neighbours(left, before, sd, correlation))
     adjusted = [replace(t, p_value=min(1.0, t.p_value * len(tests))) for t in tests]
@@ -255,6 +267,34 @@ def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Stru
         "narrow."
     )
     return Structure(NEIGHBOURS, p, found * rms, words)
+
+
+def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
+    """Test whether a reading lies farther off than noise ever does.
+
+    The scale is the median of all errors, which a few wild readings do not change, or
+    the rounding of a display; `sd` [N] is that of each row given the one before.
+    """
+    size, far = len(sd), np.abs(left.scaled)
+    rounding = least_step(records.force) / np.sqrt(12.0)
+    scale = np.maximum(_NORMAL * float(np.median(far)), rounding / sd)
+    times = far / np.maximum(scale, 1e-300)
+    chance = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
+    row = int(np.argmax(far))
+    wild = np.flatnonzero((chance <= FALSE_ALARM) & (times >= _WILD))
+    # The row after a wild one is off as well.
+    many = int(np.sum(np.diff(wild, prepend=-2) > 1))
+    is_wild = 0 < many <= _FEW and far[row] ** 2 >= _SHARE * float(far @ far)
+    others = f" ({many} such readings)" if many > 1 else ""
+    off = float(far[row] * sd[row])
+    force, place = (float(v[row]) for v in (records.force, records.deformation))
+    words = (
+        f"Reading {row + 1}, {force:.4g} {{N}} at {place:.4g} "
+        f"{{mm}}, lies {off:.3g} {{N}} off, "
+        f"{times[row]:.0f} times as far as readings scatter{others}: all that is said "
+        "here may be off."
+    )
+    return Structure(WILD, float(chance[row]) if is_wild else 1.0, off, words)
 
 
 def _scatter(left: _Left, records: Records, sd: np.ndarray) -> Structure:
