@@ -66,7 +66,7 @@ def test_the_size_of_a_drift_is_within_its_interval():
 
 @pytest.mark.parametrize("many", [60, 200])
 def test_the_scatter_of_days_is_that_of_their_levels(many):
-    """With several values a day: fewer do not separate their scatter from that of days."""
+    """Of several values a day: fewer do not separate values and days."""
     found = [each.days_sd for each in repeated("days", many=many, size=2.5)]
     assert np.mean(found) == pytest.approx(2.5, rel=0.1)
 
