@@ -1,5 +1,7 @@
 """Gears that are integrated out leave the density of the whole covariance matrix."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 from scipy import optimize
 from scipy.stats import multivariate_normal
 
+from hdcal.data.prior import Prior
 from hdcal.fleets.model.gear_noise import GearNoise
 from hdcal.fleets.model.gear_quantity import (
     GearQuantity,
@@ -14,6 +17,8 @@ from hdcal.fleets.model.gear_quantity import (
     draw_gears,
     gear_posterior,
 )
+from hdcal.fleets.model.priors import ODD, ODD_RATIO
+from hdcal.inference import laplace
 from hdcal.inference.force_model.likelihood import log_likelihood
 
 # One-way layouts. Davies, Statistical Methods in Research and Production (1947): yields
@@ -122,6 +127,23 @@ def test_draws_of_gears_follow_their_density():
     error = np.std(np.asarray(drawn.apart), axis=0) / np.sqrt(4000)
     assert np.all(np.abs(np.mean(drawn.apart, axis=0) - mean) < 4.0 * error)
     np.testing.assert_allclose(drawn.off[0], weight[:, 1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("by_row", [0.0, 1.0])
+def test_sizes_of_kilonewtons_have_a_mode(by_row):
+    one = problem(seed=5, relative=0.0, by_row=by_row)
+    priors = {
+        "_centre": Prior("normal", (0.0, 1e4)),
+        "spread": Prior("half_normal", (10.0,)),
+        "off_share": ODD,
+        "off_ratio": ODD_RATIO,
+    }
+    for size in (-5000.0, 5000.0):
+        far = replace(one, value=one.value + size, priors=priors)
+        found = laplace.fit(far, {"_centre": size})
+        middle = np.mean(far.value[far.present > 0.0])
+        assert float(found.centre["_centre"]) == pytest.approx(middle, abs=10.0)
+        assert np.all(np.isfinite(found.factor))
 
 
 @pytest.mark.parametrize("freedom", [1.0, 4.0, 20.0, 200.0, 2000.0])

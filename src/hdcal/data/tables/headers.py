@@ -37,8 +37,8 @@ _ALIASES = {
     "time": "time zeit prufzeit laufzeit temps duree tempo 时间 時間",
     "run": """run mounting repeat lauf messung versuch einspannung aufspannung
         wiederholung essai""",
-    "specimen": """specimen gear serial seriennummer probe prufling eprouvette 试样
-        試験片""",
+    "specimen": """specimen gear serial seriennummer probe prufling eprouvette provino
+        campione 试样 試験片""",
     "lot": "lot batch los charge",
     "operator": "operator inspector bediener prufer operateur",
     "rig": "rig testrig bench testbench prufstand banc 试验台",

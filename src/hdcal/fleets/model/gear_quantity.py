@@ -95,7 +95,9 @@ class GearQuantity(Sampled):
         """Declare the joint density of the population and all rows to NumPyro."""
         values = {name: sample_site(name, p) for name, p in self.priors.items()}
         place = values.pop("_centre")
-        centre = jnp.where(self.relative > 0.0, jnp.exp(place), place)
+        # The exponential of a force of 1 kN has no gradient, used or not.
+        log_centre = jnp.where(self.relative > 0.0, place, 0.0)
+        centre = jnp.where(self.relative > 0.0, jnp.exp(log_centre), place)
         values["centre"] = numpyro.deterministic("centre", centre)
         for kind, groups in self.groups.items():
             spread = values[f"{kind}_ratio"] * values["spread"]
