@@ -183,9 +183,7 @@ def test_long_tables_are_cut_except_in_a_browser():
     found = forces(103)
     assert found.text().count("\nA  ") == 100 and "3 more rows" in found.text()
     assert found._repr_html_().count("<td>A</td>") == 100
-    page = found.page()
-    assert page.count("<td>A</td>") == 103 and '<table data-page="25">' in page
-    assert page.index("<tbody hidden") < page.rindex("<td>A</td>")
+    assert found.page().count("<td>A</td>") == 103
 
 
 @pytest.mark.parametrize("long", ["a long name " * 9, "n" * 200])
