@@ -112,7 +112,11 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
 
 
 def read_tones(text: str, option: str) -> list[float]:
-    """Read a frequency, 5, or the ends of a chirp, 5:200."""
+    """Read 5 or 5:200 as numbers.
+
+    Raises:
+        InputError: it is neither.
+    """
     try:
         return [float(part) for part in text.split(":")]
     except ValueError:

@@ -47,8 +47,8 @@ def repeated_option(
 sheet_option = click.option(
     "--sheet",
     metavar="NAME",
-    help="Read this sheet of a workbook (.xlsx) [default: the one with readings]. "
-    "'Probe*' reads several, each a specimen.",
+    help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
+    "several, each a specimen.",
 )
 column_option = repeated_option(
     "--column",
@@ -72,8 +72,7 @@ reading_options = combined(
     click.option(
         "--reading",
         type=click.Choice(READINGS),
-        help="Take the deformation as radial or diametral where the gear file does not "
-        "say [default: radial].",
+        help="Of the deformation, where the gear file is silent [default: radial].",
     ),
     click.option(
         "--specimen",
@@ -101,7 +100,7 @@ case_options = combined(reading_options, click.argument("data", metavar="DATA"))
 
 
 def take_reading(settings: dict) -> dict:
-    """Remove the values of `reading_options` from settings and return them."""
+    """Take the values of `reading_options` out of a command's settings."""
     names = "gear", "columns", "theory", "encoding", "sheet", "reading", "specimen"
     names += ("range",)
     return {name: settings.pop(name) for name in names}
