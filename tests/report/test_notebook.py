@@ -90,13 +90,6 @@ def test_pyplot_is_asked_where_no_axes_are_given(results):
         pyplot.close(axes.figure)
 
 
-def test_a_case_says_what_was_guessed_of_it(results):
-    case = hdcal.read_case(results["Case"][0].to_frame())
-    assert case.notes
-    shown = case._repr_html_()
-    assert "without a gear file the part is a spring" in shown
-
-
 def test_residuals_say_their_shapes(results):
     left = results["Residuals"][0]
     assert (left.structure, left.noise) == ((), ())

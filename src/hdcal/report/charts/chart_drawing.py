@@ -1,7 +1,6 @@
 """Drawing of charts by Matplotlib: axes, SVG and PNG."""
 
 import io
-import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -33,8 +32,8 @@ from hdcal.report.charts.chart_spec import (
 Kind = Literal["svg", "png"]
 _DARK = "#222222"
 _DASHES = {"solid": "-", "dashed": (0, (4, 2)), "dotted": ":", "dashdot": "-."}
-# Width of a figure and of the failure mark [inch], and dots per inch of a PNG.
-_WIDTH, _MARK_WIDTH, _DPI = 7.6, 7.1, 160
+# Width of a figure [inch], and dots per inch of a PNG.
+_WIDTH, _DPI = 7.6, 160
 # More points than this are drawn small, and as pixels in an SVG.
 _MANY = 300
 # Most names of an axis, longest name, and most characters of level names together.
@@ -55,9 +54,6 @@ _STYLE: dict[Any, Any] = {
     "axes.titlesize": 10,
     # Automatic placement takes a seventh of all drawing.
     "axes.titley": 1.0,
-    "axes.unicode_minus": True,
-    "figure.autolayout": False,
-    "figure.constrained_layout.use": False,
     "figure.facecolor": "white",
     "font.size": 9.5,
     "grid.color": "#e6e6e6",
@@ -65,7 +61,6 @@ _STYLE: dict[Any, Any] = {
     "hatch.linewidth": 0.6,
     "legend.fontsize": 8.5,
     "legend.frameon": False,
-    "path.simplify": True,
     "svg.fonttype": "path",
     "svg.hashsalt": "hdcal",
     "text.usetex": False,
@@ -149,17 +144,14 @@ def _places(chart: Chart) -> tuple[list[tuple[int, int]], list[float]]:
             heights.append(0.0)
             column = 0
         places.append((len(heights) - 1, column))
-        heights[-1] = max(heights[-1], panel.height or _height(panel, chart))
+        usual = 2.6 if chart.columns == 1 else 2.1
+        if panel.wide or len(chart.panels) == 1:
+            usual = 4.4
+        if panel.horizontal:
+            usual = 1.1 + 0.3 * max(len(panel.names), 2)
+        heights[-1] = max(heights[-1], panel.height or usual)
         column = chart.columns if panel.wide else column + 1
     return places, heights
-
-
-def _height(panel: Panel, chart: Chart) -> float:
-    if panel.horizontal:
-        return 1.1 + 0.3 * max(len(panel.names), 2)
-    if panel.wide or len(chart.panels) == 1:
-        return 4.4
-    return 2.6 if chart.columns == 1 else 2.1
 
 
 def _plain(text: str, length: int = 80) -> str:
@@ -173,8 +165,6 @@ def _plain(text: str, length: int = 80) -> str:
 
 def _watermark(figure: Figure) -> None:
     """Write across a figure that its result must not be used."""
-    rise = (0.95 * figure.get_figheight() - 0.6) / _MARK_WIDTH
-    rotation = min(28.0, math.degrees(math.asin(min(max(rise, 0.0), 1.0))))
     figure.text(
         0.5,
         0.5,
@@ -183,7 +173,6 @@ def _watermark(figure: Figure) -> None:
         alpha=0.35,
         fontsize=44,
         fontweight="bold",
-        rotation=rotation,
         ha="center",
         va="center",
         zorder=100,
@@ -206,15 +195,12 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
             handles = handle if isinstance(handle, list) else [handle]
             entries.setdefault(mark.label, []).extend(handles)
     x, y = ("y", "x") if panel.horizontal else ("x", "y")
-    for axis, label, limits, log in (
-        (x, panel.x, panel.x_limits, panel.x_log),
-        (y, panel.y, panel.y_limits, panel.y_log),
-    ):
-        axes.set(**{f"{axis}label": _plain(label)})
+    axes.set(**{f"{x}label": _plain(panel.x), f"{y}label": _plain(panel.y)})
+    for axis, log in ((x, panel.x_log), (y, panel.y_log)):
         if log:
             axes.set(**{f"{axis}scale": "log"})
-        if limits != (None, None):
-            axes.set(**{f"{axis}lim": limits})
+    if panel.y_limits != (None, None):
+        axes.set(**{f"{y}lim": panel.y_limits})
     if panel.names:
         _name(axes, panel)
     if not panel.y_ticks:
@@ -312,19 +298,14 @@ def _bars(axes: Axes, mark: Bars, turned: bool, order: float) -> Any:
     return axes.bar(mark.at, mark.high - low, mark.width, bottom=low, **look)
 
 
-def _is_upright(axis: str, turned: bool) -> bool:
-    """Return whether the axis is the horizontal one."""
-    return (axis == "x") != turned
-
-
 def _rule(axes: Axes, mark: Rule, turned: bool, order: float) -> Any:
-    draw = axes.axvline if _is_upright(mark.axis, turned) else axes.axhline
+    draw = axes.axvline if (mark.axis == "x") != turned else axes.axhline
     look = {"linestyle": _DASHES[mark.dash], "linewidth": 1.1, "zorder": order}
     return draw(mark.at, color=mark.colour or _DARK, **look)
 
 
 def _span(axes: Axes, mark: Span, turned: bool, order: float) -> Any:
-    draw = axes.axvspan if _is_upright(mark.axis, turned) else axes.axhspan
+    draw = axes.axvspan if (mark.axis == "x") != turned else axes.axhspan
     look = {"color": mark.colour, "alpha": mark.opacity, "linewidth": 0.0}
     return draw(mark.low, mark.high, zorder=order, **look)
 

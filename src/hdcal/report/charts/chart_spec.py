@@ -104,8 +104,7 @@ class Panel:
         title: above the panel.
         names: categories at 1, 2, … of the x axis.
         horizontal: whether the axes are exchanged, so that long names have room.
-        x_limits: ends of the axis; None: by the marks.
-        y_limits: as x_limits.
+        y_limits: ends of the axis; None: by the marks.
         x_log: whether the axis is logarithmic.
         y_log: as x_log.
         y_ticks: whether the y axis has a scale.
@@ -120,7 +119,6 @@ class Panel:
     title: str = ""
     names: Sequence[str] = ()
     horizontal: bool = False
-    x_limits: tuple[float | None, float | None] = (None, None)
     y_limits: tuple[float | None, float | None] = (None, None)
     x_log: bool = False
     y_log: bool = False
