@@ -33,7 +33,7 @@ from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 @click.option(
     "--since",
     metavar="DAY",
-    help="Leave out readings before this day: 2026-09-01.",
+    help="Leave out readings before a day, as 2026-09-01.",
 )
 @options.skip_bad_option
 @click.option(
@@ -46,7 +46,7 @@ from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 @options.json_option
 @click.pass_obj
 def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **given):
-    """Compare the gears in DATA: stiffness, scatter, outliers.
+    """Compare the gears in DATA: their stiffness, their scatter, the odd ones.
 
     DATA has a column `specimen`, gear or serial, or is a folder with a file, or a
     folder of data.csv and gear.toml, for each gear.

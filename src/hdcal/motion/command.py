@@ -11,66 +11,46 @@ from hdcal.cli.options import json_option, repeated_option, seed_option
 from hdcal.errors import Finding
 
 
-@command(short_help="Predict the motion of a gear under a force over time.")
+@command(short_help="How a calibrated gear moves under a force over time.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--force",
     required=True,
     metavar="F.csv|step|sine|chirp",
-    help="Apply this force: a table with time_s and force_N, or a shape.",
+    help="The force on the gear: a table with time_s and force_N, or a shape.",
 )
 @repeated_option(
     "--column",
     "columns",
     metavar="QUANTITY=HEADER",
     read=read_columns,
-    help="Read a quantity of F.csv from a column: force=Load[kgf].",
+    help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
 )
-@click.option(
-    "--amplitude", type=FORCE, help="Set the amplitude of a shape [N] [default: 80]."
-)
+@click.option("--amplitude", type=FORCE, help="Of a shape [N] [default: 80].")
 @click.option(
     "--frequency",
     type=Parsed("HZ", read_tones),
-    help="Set the frequency of a sine [Hz], 5, or the ends of a chirp, 5:200.",
+    help="Of a sine [Hz]: 5; of a chirp its first and last: 5:200.",
 )
 @click.option(
-    "--duration",
-    type=float,
-    metavar="S",
-    help="Set the duration of a shape [s] [default: 0.5].",
+    "--duration", type=float, metavar="S", help="Of a shape [s] [default: 0.5]."
 )
-@click.option(
-    "--temperature",
-    type=float,
-    help="Set the temperature of the gear [°C] [default: the tested one].",
-)
-@click.option(
-    "--mass-kg",
-    "mass",
-    type=float,
-    help="Set the moved mass [kg] [default: its prior].",
-)
-@click.option(
-    "--damping", type=float, help="Set the damping c [N·s/mm] [default: its prior]."
-)
-@click.option(
-    "--points", default=1001, show_default=True, help="Predict at so many times."
-)
-@click.option(
-    "--draws", default=500, show_default=True, help="Integrate so many draws."
-)
+@click.option("--temperature", type=float, help="Of the gear [°C] [default: tested].")
+@click.option("--mass-kg", "mass", type=float, help="Moved mass [default: prior].")
+@click.option("--damping", type=float, help="Damping c [N·s/mm] [default: prior].")
+@click.option("--points", default=1001, show_default=True, help="Times to answer at.")
+@click.option("--draws", default=500, show_default=True, help="Gears to integrate.")
 @seed_option
 @click.option(
-    "--out", metavar="DIR", help="Write the result to DIR [default: RUN-response]."
+    "--out", metavar="DIR", help="Result folder to make [default: RUN-response]."
 )
 @click.option("--replace", is_flag=True, help="Replace an older result of hdcal.")
 @json_option
 @click.pass_obj
 def respond(console: Console, run, force, columns, out, replace, **asked):
-    """Predict the motion of the gear of RUN, a result folder, under a force over time.
+    """Predict how the gear of RUN, a result folder, deforms under a force over time.
 
-    Units are N, mm, s, Hz, kg, N·s/mm. The motion begins at rest.
+    Units: N, mm, s, Hz, kg, N·s/mm. Motion begins at rest.
     """
     from hdcal.data.measurements.force_table import read_force
     from hdcal.inference.model_average import load_models

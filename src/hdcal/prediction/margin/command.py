@@ -12,72 +12,70 @@ from hdcal.errors import Finding
 
 
 @command(
-    short_help="Bound the force at a deformation.",
+    short_help="Force needed at a deformation, and the margin to it.",
     context_settings={"show_default": True},
 )
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--deformation",
-    type=LENGTH,
-    required=True,
-    help="Set the deformation as read [mm].",
+    "--deformation", type=LENGTH, required=True, help="Deformation as read [mm]."
 )
 @click.option(
     "--limit-force",
     type=FORCE,
-    help="Compare with this capacity of the actuator [N], by its magnitude.",
+    help="Capacity of the actuator [N]: its size, in compression and in tension.",
 )
 @click.option(
     "--rule",
     type=click.Choice(["guarded", "simple"]),
-    help="Decide with a guard band or without [default: guarded].",
+    help="Decision about it, by the expanded uncertainty or not [default: guarded].",
 )
 @click.option(
     "--given-force",
     type=FORCE,
-    help="Bound the deformation at this force [N].",
+    help="Force with its sign [N] whose deformation is asked for.",
 )
 @click.option(
     "--temperature",
     type=WINDOW,
-    help="Bound over -20:80 or at 20,60 [°C] [default: the tested temperature].",
+    help="Window -20:80, or a list 20,60 [°C] [default: the tested one].",
 )
 @click.option(
-    "--content", default=0.99, help="Set the share of the population per bound."
+    "--content", default=0.99, help="Share of the population within each bound."
 )
-@click.option("--confidence", default=0.95, help="Set the confidence of each bound.")
+@click.option("--confidence", default=0.95, help="Confidence of each bound.")
 @click.option(
     "--required-probability",
     type=float,
-    help="Require that the capacity holds for this share [default: --content].",
+    help="Share of the population that a capacity has to hold [default: --content].",
 )
 @click.option(
     "--population",
     metavar="WHOSE",
-    help="Bound readings, mountings or specimens [default: the widest tested].",
+    help="readings, mountings or specimens [default: the widest that was tested].",
 )
 @click.option(
     "--quantity",
     type=click.Choice(["reading", "load"]),
     default="reading",
-    help="Bound the reading of the gauge, or the load on the gear.",
+    help="What the gauge shows, or what acts on the gear.",
 )
-@options.direction_option("Bound the force on loading or unloading.")
+@options.direction_option("Loading or unloading, in compression and in tension.")
 @options.tolerance_option
 @options.seed_option
-@options.folder_options("Write a result folder with a report to DIR.")
+@options.folder_options("Write a result folder with a report.")
 @options.json_option
 @click.option(
     "--certificate",
     is_flag=True,
-    help="Write a certificate to sign, one A4 page.",
+    help="Also write a certificate to sign, one A4 page.",
 )
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
-    """Bound the force at a deformation, from RUN.
+    """Bound the force needed at a deformation, from RUN.
 
-    RUN is a result folder of `hdcal calibrate`, `diagnose` or `fleet`. Hypotheses of a
-    diagnosis are averaged by their probability; from a fleet, future gears are bounded.
+    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
+    could not separate are averaged over by their probability. From a folder of `hdcal
+    fleet` it bounds what the next gears need.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.prediction.margin.margin import margin as bounds_of
