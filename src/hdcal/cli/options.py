@@ -161,13 +161,13 @@ start_options = combined(
     click.option(
         "--gear",
         metavar="GEAR.toml",
-        help="Use the priors of this gear instead of RUN.",
+        help="Without RUN: a gear of which priors are known.",
     ),
 )
 
 
 def material_option(help: str) -> Decorator:
-    """Return --material, with this help."""
+    """Return --material."""
     return repeated_option(
         "--material", "materials", metavar="NAME", read=read_list, help=help
     )
