@@ -4,8 +4,6 @@ import numpy as np
 import openpyxl
 import pytest
 
-from hdcal.data.findings import FileFindings
-from hdcal.data.measurements.force_table import read_columns
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 
@@ -165,22 +163,11 @@ def test_columns_without_headers_are_named_by_number(tmp_path):
     check(read(tmp_path, text, columns={"deformation": "2[mm]", "force": "3[N]"}))
 
 
-@pytest.mark.parametrize(
-    ("headers", "newton_metres", "radians"),
-    [
-        ("Torque (mNm),Twist (arcmin)", 1e-3, np.pi / 10800),
-        ("load [lbf*in],travel [deg]", 0.112984829, np.pi / 180),
-        ("torque_Nm,angle_rad", 1.0, 1.0),
-    ],
-)
-def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radians):
-    (tmp_path / "log.csv").write_text(f"{headers}\n" + rows(F, X))
-    with FileFindings("log.csv") as findings:
-        spring = ("torque", "angle")
-        how = {"quantities": spring, "required": spring}
-        found = read_columns(tmp_path / "log.csv", None, findings, **how)
-    np.testing.assert_allclose(found["torque"], newton_metres * F, rtol=1e-8)
-    np.testing.assert_allclose(found["angle"], radians * X, rtol=1e-12)
+def test_torques_and_angles_are_converted(tmp_path):
+    text = "Torque (mNm),Twist (arcmin)\n" + rows(F, X)
+    case = read(tmp_path, text)
+    np.testing.assert_allclose(case.records.force, 1e-3 * F, rtol=1e-8)
+    np.testing.assert_allclose(case.records.deformation, np.pi / 10800 * X, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -188,6 +175,7 @@ def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radi
     [
         (b"<html><body><table><tr><td>1</td></tr></table></body></html>", "HTML"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), ".xls"),
+        (b"MATLAB 5.0 MAT-file" + bytes(600), "MATLAB"),
     ],
 )
 def test_a_file_that_is_no_table_is_called_what_it_is(tmp_path, raw, word):
@@ -204,5 +192,5 @@ def test_formulas_without_values_are_called_so(tmp_path):
     for place, x in enumerate(X.tolist()):
         book.active.append([x, 1.0, f"=A{place + 2}*12"])
     book.save(tmp_path / "book.xlsx")
-    with pytest.raises(InputError, match="formulas without values"):
+    with pytest.raises(InputError, match="'force_N' has no cells"):
         read_case(tmp_path / "book.xlsx")

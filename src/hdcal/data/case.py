@@ -17,7 +17,6 @@ from hdcal.screening.result import Screening
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
 
 
@@ -156,12 +155,6 @@ class Case:
         for name in sorted(labels.keys() & records.known):
             columns[name] = np.array(labels[name])[np.asarray(getattr(records, name))]
         return pd.DataFrame(columns)
-
-    def to_datatree(self) -> "xr.DataTree":
-        """Return the readings as xarray's DataTree, over the dimension `row`."""
-        import xarray as xr
-
-        return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the readings.

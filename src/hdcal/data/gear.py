@@ -19,7 +19,6 @@ from hdcal.data.gear_file.schema import (
     GearFile,
     size_findings,
     tables_of,
-    with_reading,
 )
 from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.data.gear_file.validation import checked
@@ -48,15 +47,9 @@ NO_MATERIAL, _MATERIAL = "not stated", "steel"
 _IN_MEMORY = "gear"
 
 
-def unsized() -> Gear:
-    """Return a part of which nothing is known: a spring of any stiffness."""
-    return read_gear({"name": "part", "theory": SPRING})
-
-
 def read_gear(
     source: Path | str | Mapping[str, Any],
     theory: str | None = None,
-    reading: str | None = None,
 ) -> Gear:
     """Read a gear file, or its content as a mapping, and merge its priors.
 
@@ -72,7 +65,6 @@ def read_gear(
         source: the TOML file; or its tables as a mapping, where the names of the tables
             may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
-        reading: `radial` or `diametral`, where the file does not state it.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -82,7 +74,6 @@ def read_gear(
     else:
         path, toml = Path(source), read_toml(Path(source), str(source))
     with Findings() as wrong:
-        toml = wrong.attempt(with_reading, toml, reading) or toml
         model = wrong.attempt(checked, GearFile, toml.table, toml)
         wrong += size_findings(toml, theory)
         if theory is not None and theory not in get_args(Theory):

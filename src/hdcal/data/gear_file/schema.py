@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field
@@ -17,7 +16,7 @@ from hdcal.data.gear_file.rig_facts import RigTable
 from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.gear_file.validation import STRICT, fault, within
 from hdcal.data.plausible import range_of
-from hdcal.data.theory_names import READINGS, SPRING, Theory
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.screening.working_range import FORM, read_range
 
@@ -157,23 +156,3 @@ def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
         remedy = "Measure the load height from the closed base"
         faults.append(("load_height", words, remedy))
     return faults
-
-
-def with_reading(toml: TomlFile, reading: str | None) -> TomlFile:
-    """Return a gear file that states how the deformation is read, where it is silent.
-
-    Raises:
-        InputError: there is no such reading, or the file states another one.
-    """
-    measurement = toml.table.get("measurement", {})
-    if reading is None or not isinstance(measurement, dict):
-        return toml
-    stated = measurement.get("deformation", reading)
-    if reading not in READINGS:
-        remedy = f"It is {' or '.join(READINGS)}"
-        raise InputError([Finding("reading", f"there is no '{reading}'", remedy)])
-    if stated != reading:
-        words = f"'{reading}' was asked for, and the gear file says '{stated}'"
-        raise InputError([Finding("reading", words, "Correct the one that is wrong")])
-    measurement = {**measurement, "deformation": reading}
-    return replace(toml, table={**toml.table, "measurement": measurement})

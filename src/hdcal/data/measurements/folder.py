@@ -37,7 +37,6 @@ def read_gear_folder(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    reading: str | None = None,
     encoding: str | None = None,
     skip_bad: bool | None = None,
     range: str | None = None,
@@ -53,7 +52,6 @@ def read_gear_folder(
             first gear. Others may differ from it in their sizes.
         columns: as in `read_case`, and so are all that follow.
         theory: overrides the gear file's.
-        reading: `radial` or `diametral`.
         encoding: encoding of the files.
         skip_bad: whether bad gears are left out.
         range: working range.
@@ -64,7 +62,7 @@ def read_gear_folder(
     Returns:
         The case, and a table of the sizes of each gear where they have files.
     """
-    asked, (named, _) = (theory, reading), asked_columns(data, columns)
+    named, _ = asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
     labels, cases = gear_labels(files, folder)
     own = [file.parent / GEAR_NAME for file in files] if cases else []
@@ -75,13 +73,14 @@ def read_gear_folder(
     base = str(nearby) if gear is None else "`gear`"
     base = str(gear) if isinstance(gear, str | Path) else base
     with Findings() as wrong:
-        common, notes = wrong.attempt(gear_of, gear, nearby, False, asked) or (None, ())
+        described = wrong.attempt(gear_of, gear, nearby, False, theory)
+        common, notes = described or (None, ())
         parts: list[_Part] = []
         unread: dict[str, Findings] = {}
         for place, (file, label) in enumerate(zip(files, labels, strict=True)):
             each, its = Findings(), None
             if own:
-                its = each.attempt(read_gear, own[place], *asked)
+                its = each.attempt(read_gear, own[place], theory)
             if its is not None and common is not None:
                 each += _differences(its, common, own[place], base)
             here = its or common

@@ -16,7 +16,6 @@ from hdcal.data.measurements.measurements import Measurements, measured_in
 from hdcal.data.measurements.notes import source_notes
 from hdcal.data.measurements.screened import asked_range
 from hdcal.data.reading import gear_of
-from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.columns import (
     REQUIRED,
@@ -25,6 +24,7 @@ from hdcal.data.tables.columns import (
     choose_columns,
     in_place_of_force,
 )
+from hdcal.data.tables.grid import frame_grid
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.tables.parquet_files import (
     frame_of,
@@ -87,7 +87,6 @@ def open_parquet(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    reading: str | None = None,
     range: str | None = None,
 ) -> Parquet:
     """Look into a Parquet file, or a folder of them, partitioned or not.
@@ -102,7 +101,7 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        common, notes = gear_of(gear, nearby, False, (theory, reading))
+        common, notes = gear_of(gear, nearby, False, theory)
         named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
         table = table_of(frame_grid(frame_of(first)), findings)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hdcal.data.findings import FileFindings, row_list
-from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import ArrayGrid, Grid, SourceLine
+from hdcal.data.tables.cells import are_numbers, is_number
+from hdcal.data.tables.grid import Grid, SourceLine
 from hdcal.data.tables.headings import Heading, find_heading
 from hdcal.data.tables.other_lines import OtherLines, is_summary
 
@@ -140,12 +140,13 @@ def _are_readings(grid: Grid, counted: list[int]) -> np.ndarray:
     unsure = [place for place in counted if not grid.is_numeric(place)]
     numbers = np.full(len(grid.rows), len(counted))
     fits = np.full(len(grid.rows), len(counted) > 0)
-    for cells in grid.read(unsure).values():
-        if cells.dtype == object:
-            each = cells.tolist()
-            held = [not isinstance(c, str) or is_number(c) for c in each]
-            numbers -= ~np.array(held, bool)
-            fits &= np.array(held, bool) | np.array([c == "" for c in each], bool)
+    for place in unsure:
+        cells = grid.read(place)
+        if cells.dtype != object:
+            continue
+        held = are_numbers(cells)
+        numbers -= ~held
+        fits &= held | (cells == "")
     fits &= numbers >= min(2, len(counted))
     if 0 not in counted and unsure:
         fits &= ~_summaries(grid.texts(0))
@@ -216,10 +217,10 @@ def _order(heading: Heading, main: Heading) -> list[int] | None:
 
 def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> Grid:
     """Return a grid with the columns of some blocks in the order of the first."""
-    columns = grid.read(range(grid.width))
-    spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
-    moved = [columns[place].astype(object) for place in range(grid.width)]
-    for number, (begin, end) in spans.items():
-        for place, other in enumerate(orders[number]):
-            moved[place][begin:end] = columns[other][begin:end]
-    return ArrayGrid(grid.rows, grid.width, [], moved)
+    columns = [grid.read(place).astype(object) for place in range(grid.width)]
+    moved = [column.copy() for column in columns]
+    for number, order in orders.items():
+        rows = slice(*np.searchsorted(block, [number, number + 1]))
+        for place, other in enumerate(order):
+            moved[place][rows] = columns[other][rows]
+    return Grid(grid.rows, moved)

@@ -301,6 +301,10 @@ class _Chooser:
         remedy = f"Say {option}HEADER[UNIT]', HEADER one of: {shown}"
         for place, header in enumerate(self._headers):
             unit = header.unit_text if header.measures(quantity) else ""
+            if unit and place in self._table.empty:
+                words += f"; {quoted(headers[place])} has no cells"
+                remedy = "Fill it in; of a workbook with formulas, save their values"
+                break
             if quantity == "force" and (weight := weight_unit(header.unit_text)):
                 words += f"; {headers[place]} is a mass"
                 unit = weight

@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable, find_table
 from hdcal.data.tables.cells import unit_in
-from hdcal.data.tables.grid import ArrayGrid, Grid
+from hdcal.data.tables.grid import Grid
 from hdcal.data.tables.headers import parse_header
 from hdcal.data.tables.headings import UNIT_LABELS
 from hdcal.data.units import find_unit
@@ -71,7 +71,7 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
     period = next((p for p in periods if headers[:p] * (width // p) == headers), 0)
     if not period or not all(headers) or len({*headers[:period]}) < period:
         return table
-    cells = table.grid.read(range(width))
+    cells = [table.grid.read(place) for place in range(width)]
     names, rows, blocks = [], [], []
     for start in range(0, width, period):
         each = np.array([cells[start + k] for k in range(period)], object)
@@ -81,7 +81,7 @@ def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
         label = np.full((1, filled.sum()), names[-1], object)
         blocks.append(np.concatenate([each[:, filled], label]))
     columns = np.concatenate(blocks, axis=1)
-    grid = ArrayGrid(np.concatenate(rows), period + 1, [], [*columns])
+    grid = Grid(np.concatenate(rows), [*columns])
     note = f"{len(names)} specimens stand side by side: {', '.join(map(quoted, names))}"
     return replace(
         table,
