@@ -53,25 +53,18 @@ class _Entry(BaseModel):
     note: Any = None
 
 
+_SIZE = Annotated[float, AfterValidator(_positive)]
 # Types of the numbers that are not any float.
 _NUMBERS: dict[str, Any] = {
-    **dict.fromkeys(
-        ("sd", "median", "log_sd", "a", "b"),
-        Annotated[float, AfterValidator(_positive)],
-    ),
+    **dict.fromkeys(("sd", "median", "log_sd", "a", "b"), _SIZE),
     "high": Annotated[float, AfterValidator(_above_low)],
 }
-
-
-def _entry_of(family: str) -> type[_Entry]:
-    """Return the model of the entries of a family."""
-    numbers: dict[str, Any] = {
-        n: (_NUMBERS.get(n, float), ...) for n in FAMILIES[family]
-    }
-    return create_model(family, __base__=_Entry, **numbers)
-
-
-_ENTRIES = {family: _entry_of(family) for family in FAMILIES}
+_ENTRIES = {
+    family: create_model(
+        family, __base__=_Entry, **{n: (_NUMBERS.get(n, float), ...) for n in numbers}
+    )
+    for family, numbers in FAMILIES.items()
+}
 
 
 def read_prior(
@@ -82,7 +75,7 @@ def read_prior(
     Args:
         entry: as parsed.
         key: dotted key, for findings.
-        toml: the file it stands in.
+        toml: the file in which it stands.
         unit: code unit of the parameter; None accepts any.
 
     Returns:

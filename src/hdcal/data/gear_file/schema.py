@@ -84,26 +84,21 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     Raises:
         InputError: a key is stated twice.
     """
-    plain = _with_text_keys(source)
-    tables: dict[str, Any] = {"gear": {}}
-    tables |= {key: plain[key] for key in plain if key in GearFile.model_fields}
-    for key in (key for key in plain if key not in GearFile.model_fields):
+    plain = {
+        str(key): dict(value) if isinstance(value, Mapping) else value
+        for key, value in source.items()
+    }
+    tables = {"gear": {}} | {n: plain[n] for n in GearFile.model_fields if n in plain}
+    for key in plain.keys() - GearFile.model_fields.keys():
         name = "measurement" if key in MeasurementTable.model_fields else "gear"
-        table = tables.get(name, {})
+        table = tables.setdefault(name, {})
         if not isinstance(table, dict):
             continue  # refused by the schema
         if key in table:
             words = f"is stated twice, alone and in the table [{name}]"
             raise InputError([Finding(key, words, "State it once")])
-        tables[name] = {**table, key: plain[key]}
+        table[key] = plain[key]
     return tables
-
-
-def _with_text_keys(source: Any) -> Any:
-    """Return a mapping and those in it as dictionaries with texts for keys."""
-    if not isinstance(source, Mapping):
-        return source
-    return {str(key): _with_text_keys(value) for key, value in source.items()}
 
 
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
@@ -120,11 +115,7 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
     if not isinstance(table, dict):
         return []
     missing = [name for name in SIZES_NEEDED if name not in table]
-    other = ""
-    if table.get("theory") == SPRING:
-        other = f"; or keep the theory '{SPRING}' of the file, which needs none"
-    elif missing == [*SIZES_NEEDED]:
-        other = f"; or take the theory '{SPRING}', which needs none"
+    other = f"; or take the theory '{SPRING}', which needs none"
     if (theory or table.get("theory")) == SPRING:
         missing = []
     findings = [

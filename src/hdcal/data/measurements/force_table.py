@@ -28,7 +28,7 @@ def read_force(
         used = choose_columns(table, columns or {}, _NEEDED, _NEEDED, findings)
         values, _ = read_values(table, used, findings)
         frame = pd.DataFrame(values, index=table.rows)
-        check_whole(frame, used, table, findings, fewest=2)
+        check_whole(frame, used, findings, fewest=2)
         check_rows(frame, used, findings)
         if "time" in frame:
             words = "the time is not later than that of the row before"

@@ -192,7 +192,7 @@ def _measured(
         notes.append("the readings below each row of headers are a run")
     frame = pd.DataFrame(values, index=table.rows)
     if whole:
-        check_whole(frame, used, table, findings)
+        check_whole(frame, used, findings)
     check_rows(frame, used, findings)
     stated = frozenset(values)
     one = np.zeros(len(frame), np.int8)

@@ -50,7 +50,7 @@ class Parquet:
 
     Attributes:
         name: name of the file or folder.
-        gear: common to all gears.
+        gear: the gear file's, common to all gears.
         files: in their order.
         root: their folder; empty where there is one file.
         schema: columns of all files.
@@ -146,7 +146,7 @@ def read_batches(
                 days = frame[name].dt.tz_localize(None).dt.normalize()
                 frame[name] = days.astype("category")
             grid = frame_grid(frame, first)
-            table = ReadTable(tuple(headers), first, grid, rows.num_rows)
+            table = ReadTable(tuple(headers), first, grid)
             how: dict = {"skip_bad": skip_bad, "whole": False}
             read = measured_in(table, used, findings, source.gear, **how)
         yield read

@@ -7,10 +7,11 @@ readings, which are kept so that their bad cells become findings.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings, row_list
+from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import are_numbers, is_number
 from hdcal.data.tables.grid import Grid, SourceLine
 from hdcal.data.tables.headings import Heading, find_heading
@@ -28,7 +29,6 @@ class ReadTable:
         headers: with their units, shape (c,).
         header_row: row of the headers in the source, or of the first reading.
         grid: the readings.
-        filled: number of lines with any cell in them, whether they fit or not.
         named: whether there is a row of headers.
         conflicts: unit that a row of units states against a header, by position.
         unit_row: that row.
@@ -42,9 +42,8 @@ class ReadTable:
     headers: tuple[str, ...]
     header_row: int
     grid: Grid
-    filled: int
     named: bool = True
-    conflicts: Mapping[int, str] = field(default_factory=dict)
+    conflicts: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
     unit_row: int | None = None
     empty: frozenset[int] = frozenset()
     notes: tuple[str, ...] = ()
@@ -58,16 +57,12 @@ class ReadTable:
 
     def take(self, kept: np.ndarray) -> "ReadTable":
         """Return the rows that are true in a mask, shape (n,)."""
-        return replace(
-            self,
-            grid=self.grid.take(kept),
-            filled=self.filled - int(np.sum(~kept)),
-            runs=None if self.runs is None else self.runs[kept],
-        )
+        runs = None if self.runs is None else self.runs[kept]
+        return replace(self, grid=self.grid.take(kept), runs=runs)
 
 
-def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str, ...]]:
-    """Return the readings of a grid under their headers, and the titles above these."""
+def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
+    """Return the readings of a grid under their headers."""
     sample = _sample(grid)
     counted, empty = _kinds(sample)
     known = _are_readings(sample, counted)
@@ -81,16 +76,11 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
     for line in sorted(lines):
         above = int(np.searchsorted(body.rows[clean], line.row))
         groups.setdefault(above, []).append(line)
-    heading = find_heading(groups[0], grid.width)
-    cells = grid.width if heading is None else heading.cells
-    if heading is not None and not empty.issuperset(range(cells, grid.width)):
-        words = f"names {cells} columns, and the readings below have {grid.width}"
-        findings.refuse(words, "Name every column", heading.row)
-    others = OtherLines(grid.width, counted, findings)
-    headings = [others.sort_above(groups.pop(0), heading)]
+    others = OtherLines(grid.width, counted)
+    headings = [_first_heading(groups.pop(0), grid.width, empty, others, findings)]
     total = int(clean.sum())
     for above, lines in groups.items():
-        later = find_heading(lines, grid.width, heading) if heading else None
+        later = find_heading(lines, grid.width, headings[0])
         if later is None or above == total:
             others.sort(lines, below=above == total)
         else:
@@ -101,10 +91,38 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
         body, clean = grid, grid.rows >= first
         clean[clean] = _are_readings(grid.take(clean), counted)
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
-    table = _joined(readings, headings, empty, others, findings)
-    findings.add_rows(others.faults)
-    filled = len(readings.rows) + len(others.faults)
-    return replace(table, filled=filled), headings[0].titles
+    words = "the columns differ from those of the first block"
+    remedy = "Name them alike, in the same order, or split the file"
+    foreign = [one.row for one in headings if one.names != headings[0].names]
+    findings.add_rows([*((row, words, remedy) for row in foreign), *others.faults])
+    return _table(readings, headings, empty, others)
+
+
+def _first_heading(
+    lines: list[SourceLine],
+    width: int,
+    empty: frozenset[int],
+    others: OtherLines,
+    findings: FileFindings,
+) -> Heading:
+    """Return the heading above the first reading; without one columns are numbered.
+
+    Raises:
+        InputError: it names fewer columns than the readings have.
+    """
+    heading = find_heading(lines, width)
+    if heading is None:
+        words = [i for i, line in enumerate(lines) if not line.counts]
+        others.above = max(words, default=-1) + 1
+        others.sort(lines[others.above :])
+        return Heading(tuple(str(i + 1) for i in range(width)))
+    if not empty.issuperset(range(heading.cells, width)):
+        words = f"names {heading.cells} columns, and the readings below have {width}"
+        findings.refuse(words, "Name every column", heading.row)
+    above = {line.row for line in lines if line.row <= heading.last}
+    others.above = len(above - {heading.row, heading.unit_row})
+    others.sort([line for line in lines if line.row > heading.last])
+    return heading
 
 
 def _sample(grid: Grid) -> Grid:
@@ -142,11 +160,10 @@ def _are_readings(grid: Grid, counted: list[int]) -> np.ndarray:
     fits = np.full(len(grid.rows), len(counted) > 0)
     for place in unsure:
         cells = grid.read(place)
-        if cells.dtype != object:
-            continue
-        held = are_numbers(cells)
-        numbers -= ~held
-        fits &= held | (cells == "")
+        if cells.dtype == object:
+            held = are_numbers(cells)
+            numbers -= ~held
+            fits &= held | (cells == "")
     fits &= numbers >= min(2, len(counted))
     if 0 not in counted and unsure:
         fits &= ~_summaries(grid.texts(0))
@@ -166,61 +183,30 @@ def _summaries(words: list[str]) -> np.ndarray:
     return found
 
 
-def _joined(
-    grid: Grid,
-    headings: list[Heading],
-    empty: frozenset[int],
-    others: OtherLines,
-    findings: FileFindings,
+def _table(
+    grid: Grid, headings: list[Heading], empty: frozenset[int], others: OtherLines
 ) -> ReadTable:
-    """Return the readings of all blocks under the headings of the first one."""
-    main = headings[0]
+    """Return the readings of all blocks under the heading of the first one."""
+    main, notes = headings[0], []
+    if others.above:
+        names = ", ".join(f"'{name}'" for name in main.names)
+        lines = "1 line" if others.above == 1 else f"{others.above} lines"
+        notes.append(f"{lines} above the table taken for titles. Its columns: {names}")
+    if main.unit_row is not None and main.unit_row > main.row:
+        notes.append(f"row {main.unit_row} taken for the units of the columns")
+    if len(headings) > 1:
+        notes.append(f"the headers stand {len(headings)} times. If not, split the file")
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
-    orders = [_order(heading, main) for heading in headings]
-    foreign = [h.row for h, order in zip(headings, orders, strict=True) if not order]
-    words = "the columns differ from those of the first block"
-    remedy = "Name them alike, or split the file"
-    findings.add_rows((row, words, remedy) for row in foreign)
-    usual = [*range(grid.width)]
-    moved = {i: order for i, order in enumerate(orders) if order and order != usual}
-    left_out = [*others.left_out()]
-    if moved:
-        grid = _reordered(grid, block, moved)
-        rows = row_list([headings[place].row for place in moved])
-        words = "the columns stand in another order below the headers of"
-        left_out.append(f"{words} {rows}")
     runs = np.unique(block, return_inverse=True)[1]
     return ReadTable(
         headers=main.names,
         header_row=main.row or (int(grid.rows[0]) if len(grid.rows) else 1),
         grid=grid,
-        filled=0,
         named=main.row > 0,
         conflicts=main.conflicts,
         unit_row=main.unit_row,
         empty=empty,
-        notes=(*others.assumed(main, len(headings)),),
-        left_out=tuple(left_out),
+        notes=tuple(notes),
+        left_out=others.note,
         runs=runs if runs.any() else None,
     )
-
-
-def _order(heading: Heading, main: Heading) -> list[int] | None:
-    """Return the places of the first block's columns in another block, or None."""
-    if heading.names == main.names:
-        return [*range(len(main.names))]
-    alike = sorted(heading.names) == sorted(main.names)
-    if not alike or len({*main.names}) < len(main.names):
-        return None
-    return [heading.names.index(name) for name in main.names]
-
-
-def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> Grid:
-    """Return a grid with the columns of some blocks in the order of the first."""
-    columns = [grid.read(place).astype(object) for place in range(grid.width)]
-    moved = [column.copy() for column in columns]
-    for number, order in orders.items():
-        rows = slice(*np.searchsorted(block, [number, number + 1]))
-        for place, other in enumerate(order):
-            moved[place][rows] = columns[other][rows]
-    return Grid(grid.rows, moved)

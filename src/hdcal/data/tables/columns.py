@@ -1,7 +1,6 @@
 """Choice of columns: which one is read as which quantity, in which unit.
 
-A column is read where its header, or the user, names it. Where several may be meant, or
-a unit is missing, that is asked; nothing is guessed.
+Where several may be meant, or a unit is missing, that is asked; nothing is guessed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -41,7 +40,7 @@ class Column:
         header: as written in the file.
         position: 0 = first column.
         unit: unit of its numbers; None for labels.
-        guessed: its header is not spelt `quantity_unit`.
+        guessed: whether its header is not spelt `quantity_unit`.
         against: another unit, which its header names itself.
     """
 
@@ -68,9 +67,9 @@ def choose_columns(
     Args:
         table: whose headers are read.
         mapping: quantity -> header with the unit in square brackets.
-        quantities: to look for.
-        required: which of them must be there.
-        findings: gets one for each header that is wrong or missing.
+        quantities: quantities to look for.
+        required: those that must be there.
+        findings: receives one for each header that is wrong or missing.
 
     Raises:
         InputError: there are no headers, and the user names no column by its number.
@@ -111,10 +110,7 @@ def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
 
 
 def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
-    """Return how a user would name each column: its header or number, with its unit.
-
-    Columns with hdcal's own headers need no other name.
-    """
+    """Return the name of each column for `columns`, but for hdcal's own headers."""
     named = {}
     for column in used.values():
         quantity, header = column.quantity, parse_header(column.header)
@@ -122,9 +118,9 @@ def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
             continue
         alone = table.headers.count(column.header) == 1
         name = column.header if alone else str(column.position + 1)
-        enough = alone and header.unit == column.unit
-        unit = "" if column.unit is None else column.unit.name
-        named[quantity] = name if enough or not unit else f"{name}[{unit}]"
+        if column.unit is not None and not (alone and header.unit == column.unit):
+            name = f"{name}[{column.unit.name}]"
+        named[quantity] = name
     return named
 
 
@@ -154,19 +150,18 @@ class _Chooser:
 
     def named(self, quantity: str, wanted: str) -> Column | None:
         """Return the column that a user named: 'Load [kN]', 'Load[kN]' or '2[kN]'."""
-        headers, add = self._table.headers, self._findings.add
+        headers = self._table.headers
         name, unit_text = _split_brackets(wanted)
         places, option = _places(wanted, name, headers), f"`columns` {quantity}="
         if len(places) != 1:
+            near = get_close_matches(name, headers, 1, 0.4) or headers[:_SHOWN]
             words = f"{option}{wanted} names a column that is not there"
-            near = get_close_matches(name, headers, 1, 0.4)
-            remedy = f"Use a header of the file, such as '{near[0]}'" if near else ""
-            remedy = remedy or "Use one of: " + ", ".join(headers[:_SHOWN])
+            remedy = f"Use a header of the file: {', '.join(near)}"
             if places:
                 words = f"{option}{wanted} fits {len(places)} columns"
                 numbers = " or ".join(str(place + 1) for place in places)
                 remedy = f"Name it by its number, {numbers}"
-            add(words, remedy, self._table.header_row, name)
+            self._findings.add(words, remedy, self._table.header_row, name)
             return None
         header, parsed = headers[places[0]], self._headers[places[0]]
         if quantity in LABELS:
@@ -175,14 +170,12 @@ class _Chooser:
         unit = in_header if unit_text is None else find_unit(unit_text)
         if unit is None or unit.dimension != DIMENSIONS[quantity]:
             text = parsed.unit_text if unit_text is None else unit_text
-            words = f"has no unit that is known for {quantity}"
-            words = f"unknown unit '{text}' for {quantity}" if text else words
+            words = f"unknown unit '{text}' for {quantity}"
             remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
-            add(words, remedy, self._table.header_row, header)
+            self._add(words, remedy, places[0])
             return None
-        against = ""
-        if in_header not in (None, unit) and in_header.dimension == unit.dimension:
-            against = in_header.name
+        same = in_header in (None, unit) or in_header.dimension != unit.dimension
+        against = "" if same else in_header.name
         return Column(quantity, header, places[0], unit, against=against)
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
@@ -238,8 +231,8 @@ class _Chooser:
     def _label_places(self, quantity: str) -> list[int]:
         """Return the places of the labels of a quantity, by headers and cells.
 
-        Of columns that tell the same rows apart the first one, and of those that tell
-        none apart one only where no other does.
+        Of columns that part the rows in the same way the first one, and one that does
+        not part them only where no other does.
         """
         headers = self._headers
         named = [i for i, header in enumerate(headers) if header.quantity == quantity]
@@ -272,15 +265,12 @@ class _Chooser:
 
     def _ask_which(self, quantity: str, places: Sequence[int]) -> None:
         names = [quoted(self._table.headers[place]) for place in places]
-        option = f"`columns` '{quantity}={places[0] + 1}'"
+        numbers = ", ".join(str(place + 1) for place in places)
+        words = f"the {quantity} may be {' or '.join(names)}"
         if len(places) == 1:
             words = f"no header names the {quantity}, which {names[0]} may hold"
-            remedy = f"If so, say {option}"
-        else:
-            words = f"the {quantity} may be {', '.join(names[:-1])} or {names[-1]}"
-            numbers = ", ".join(str(place + 1) for place in places)
-            remedy = f"Say which, by its number: {option}"
-            remedy += f"; the numbers are {numbers}" if len(places) > 2 else ""
+        remedy = f"Say which, by its number ({numbers}): "
+        remedy += f"`columns` '{quantity}={places[0] + 1}'"
         self._add(words, remedy, places[min(1, len(places) - 1)])
 
     def _ask_unit(self, quantity: str, place: int) -> None:
@@ -353,5 +343,5 @@ def _refuse_conflicts(
         unit = table.conflicts.get(column.position)
         if unit and column.unit is not None and not column.against:
             words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
-            remedy = "Leave one of them out"
-            findings.add(f"{words}units {unit}", remedy, table.unit_row)
+            words += f"units {unit}"
+            findings.add(words, "Leave one of them out", table.unit_row)
