@@ -39,10 +39,8 @@ ONE = [
     (GEAR + "lenght_mm = 3\n", "gear.lenght_mm", "'length_mm'"),
     (GEAR + "[measurment]\n", "measurment", "'measurement'"),
     (GEAR.replace("0.68", "40.0"), "gear.wall_thickness_mm", "not thinner"),
-    (GEAR.replace("0.68", "-1"), "gear.wall_thickness_mm", "-1 mm does not lie"),
     (GEAR.replace("70.0", "nan"), "gear.length_mm", "finite"),
     (GEAR.replace("70.0", '"70"'), "gear.length_mm", "number"),
-    (GEAR.replace("70.0", "1e9"), "gear.length_mm", "does not lie"),
     (GEAR + 'material = "40CrNiMo"\n', "gear.material", "'40CrNiMoA'"),
     (GEAR + 'material = "my.toml"\n', None, "not exist"),
     (GEAR + 'theory = "cups"\n', "gear.theory", "'cup'"),
@@ -51,13 +49,10 @@ ONE = [
         GEAR + "nominal_deformation_mm = 40\n",
         *("gear.nominal_deformation_mm", "below the radius"),
     ),
-    (M + 'deformation = "diameter"\n', "measurement.deformation", "'diametral'"),
     ("priors = 3\n" + GEAR, "priors", ""),
     (GEAR + "radius_mm = 3\n", None, "not TOML"),
     (GEAR + "name = " + "[" * 5000, None, "not TOML"),
     (GEAR + "[rig]\nfilter_Hz = inf\n", "rig.filter_Hz", "finite"),
-    (GEAR + "[rig]\ngauge_rage_mm = 5.0\n", "rig.gauge_rage_mm", "'gauge_range_mm'"),
-    (P + 'Eo = { family = "normal" }\n', "priors.Eo", "'E0'"),
     (P + "force_gain = { family = 'fixed', value = 1 }\n", "priors.force_gain", ""),
     (P + "K = 2.0\n", "priors.K", "not a table"),
     (P + "K = { median = 2 }\n", "priors.K.family", "is missing"),
@@ -69,15 +64,12 @@ ENTRIES = [
     ("K", "family = 'lognormal', median = 2", ".log_sd", "is missing"),
     ("K", "family = 'lognormal', median = 2, log_sd = 1, sd = 1", ".sd", "unknown key"),
     ("K", "family = 'uniform', low = 3, high = 2", ".high", "not below"),
-    ("K", "family = 'normal', mean = -2, sd = 1", ".mean", "does not lie"),
     ("sigma", "family = 'half_normal', sd = -1", ".sd", "not positive"),
     ("E0", "family = 'normal', mean = 207, sd = 3", "", "without a unit"),
     ("E0", "family = 'normal', mean = 7, sd = 3, unit = 'N'", ".unit", "not measure"),
-    ("E0", "family = 'normal', mean = 7, sd = 3, unit = '9**9'", ".unit", "not a unit"),
     ("slack.c", "family = 'half_normal', sd = 1, unit = 'mA'", ".unit", "not a unit"),
     ("noise_correlation", "family = 'fixed', value = 1.0", ".value", "below 1"),
     ("noise_correlation", "family = 'uniform', low = 0, high = 1.5", ".high", "1"),
-    ("noise_correlation", "family = 'uniform', low = -0.5, high = 0.5", ".low", "0"),
     ("noise_correlation", "family = 'normal', mean = 0.3, sd = 0.3", ".family", "1"),
 ]
 ONE += [
@@ -88,10 +80,8 @@ ONE += [
 CERTIFICATES = [
     ("", "", "states no uncertainty"),
     ("expanded_percnt = 1", ".expanded_percnt", "'expanded_percent'"),
-    ("expanded_mm = 1", ".expanded_mm", "unknown key"),
     ("expanded_N = 1, k = 0.5", ".k", "does not lie"),
     ("expanded_percent = -1", ".expanded_percent", "does not lie"),
-    ("expanded_percent = 25", ".expanded_percent", "20 %"),
 ]
 ONE += [
     (

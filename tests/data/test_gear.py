@@ -7,15 +7,13 @@ import pytest
 from scipy import signal
 
 from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.gear import NO_MATERIAL, at_full_scale, read_gear
+from hdcal.data.gear import NO_MATERIAL, read_gear
 from hdcal.data.gear_file.certificates import is_stated
-from hdcal.data.gear_file.rig_facts import rows_of_half_cycle
-from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior import Prior
 from hdcal.data.priors import (
     MODEL_UNITS,
     SCALE_UNITS,
     effect_priors,
-    material_names,
     material_priors,
     rig_priors,
 )
@@ -101,18 +99,6 @@ def test_a_material_file(read, tmp_path):
     assert gear.priors["E0"].numbers == pytest.approx((70e3, 1e3))
 
 
-@pytest.mark.parametrize("name", material_names())
-def test_a_shipped_material_is_plausible(name):
-    facts = material_priors(name)
-    assert 1e3 < facts["E0"].numbers[0] < 3e5 and facts["E0"].unit == "MPa"
-    assert 1e-4 < facts["alpha"].numbers[0] < 1e-2 and facts["alpha"].unit == "1/K"
-    assert 0.2 < facts["poisson"].numbers[0] < 0.45
-    assert 1e-9 < facts["density"].numbers[0] < 1e-8
-    assert 5e-6 < facts["cte"].numbers[0] < 2e-4
-    for prior in facts.values():
-        assert prior.source and len(prior.numbers) == len(FAMILIES[prior.family])
-
-
 # A spring.
 
 
@@ -141,15 +127,6 @@ def test_the_prior_stiffness_of_a_spring_is_that_of_the_readings(tmp_path):
     assert middle == pytest.approx(30.2e3 / 6.0, rel=0.05)
     assert log_sd == rig_priors()["spring_stiffness"].numbers[1]
     assert gear.priors["sigma"].numbers[0] == pytest.approx(0.005 * 30e3, rel=0.05)
-
-
-@pytest.mark.parametrize("scale", [FullScale(1e9, 1e-6), FullScale(1e-9, 1e6)])
-def test_the_stiffness_keeps_to_its_range_and_a_stated_one_stays(read, scale):
-    middle = at_full_scale(read(above=SPRING), scale).priors["K"].numbers[0]
-    assert 1e-12 <= middle <= 1e12
-    stated = read("[priors]\n" + STIFF, SPRING)
-    assert stated.priors["K"].numbers == pytest.approx((3000.0, 0.2))
-    assert at_full_scale(stated, scale).priors["K"] == stated.priors["K"]
 
 
 # Full scale.
@@ -299,12 +276,3 @@ def test_noise_behind_a_filter_is_correlated_as_the_prior_expects():
     assert correlation_of(rig, with_time=False).family == "uniform"
     stated = {"noise_correlation": {"family": "fixed", "value": 0.1}}
     assert correlation_of({**rig, "priors": stated}).numbers == (0.1,)
-
-
-def test_a_half_cycle_lies_between_two_turns():
-    up = np.linspace(0.0, 1.0, 21)
-    path = np.concatenate([up, up[-2::-1], up[1:]])
-    rows = rows_of_half_cycle(path, np.zeros(len(path), int))
-    assert rows == pytest.approx(20.0, abs=1.0)
-    twice = np.tile(path, 2)
-    assert rows_of_half_cycle(twice, np.repeat([0, 1], len(path))) == rows

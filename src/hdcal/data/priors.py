@@ -69,11 +69,11 @@ def read_entries(
 
     Args:
         table: as parsed.
-        units: name -> code unit of every parameter that it may hold.
+        units: code unit of every parameter that it may hold.
         toml: the file in which it stands.
         prefix: dotted key of the table, empty at the top.
-        effects: whether it may hold parameters of effects too, as a table for each
-            effect or as `effect.parameter`. Their names are not checked here.
+        effects: whether it may hold parameters of effects, unchecked, too: a table for
+            each effect, or `effect.parameter`.
 
     Raises:
         InputError: holds everything that is wrong with the table.
@@ -125,10 +125,7 @@ def _shipped(name: str) -> dict[str, Prior]:
 
 
 def rig_priors() -> dict[str, Prior]:
-    """Return shipped priors, keys of `MODEL_UNITS`, `SCALE_UNITS` and `SPRING_UNITS`.
-
-    E0 and alpha are those of the material.
-    """
+    """Return shipped priors by the names in MODEL_, SCALE_ and SPRING_UNITS."""
     return _shipped("rig").copy()
 
 

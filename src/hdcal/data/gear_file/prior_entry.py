@@ -59,12 +59,15 @@ _NUMBERS: dict[str, Any] = {
     **dict.fromkeys(("sd", "median", "log_sd", "a", "b"), _SIZE),
     "high": Annotated[float, AfterValidator(_above_low)],
 }
-_ENTRIES = {
-    family: create_model(
-        family, __base__=_Entry, **{n: (_NUMBERS.get(n, float), ...) for n in numbers}
-    )
-    for family, numbers in FAMILIES.items()
-}
+
+
+def _entry_of(numbers: tuple[str, ...]) -> type[_Entry]:
+    """Return the model of the entries of a family with these numbers."""
+    fields: dict[str, Any] = {n: (_NUMBERS.get(n, float), ...) for n in numbers}
+    return create_model("Entry", __base__=_Entry, **fields)
+
+
+_ENTRIES = {family: _entry_of(numbers) for family, numbers in FAMILIES.items()}
 
 
 def read_prior(

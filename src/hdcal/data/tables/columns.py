@@ -174,8 +174,9 @@ class _Chooser:
             remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
             self._add(words, remedy, places[0])
             return None
-        same = in_header in (None, unit) or in_header.dimension != unit.dimension
-        against = "" if same else in_header.name
+        against = ""
+        if in_header and in_header != unit and in_header.dimension == unit.dimension:
+            against = in_header.name
         return Column(quantity, header, places[0], unit, against=against)
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
