@@ -62,14 +62,8 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
     telling = cells.columns[several]
     if telling.empty:
         return None
-    table = cells[telling].assign(gear=gear)
-    index = table.groupby([*table], sort=False).ngroup().to_numpy()
-    each = table.drop_duplicates()
-    labels = each[telling].agg(" ".join, axis=1)
-    # No two mountings of a gear have the same label.
-    count = labels.groupby([each["gear"], labels]).cumcount()
-    names = [f"{n} ({k + 1})" if k else n for n, k in zip(labels, count, strict=True)]
-    return np.array(names, object)[index]
+    first, *others = (cells[name] for name in telling)
+    return first.str.cat(others, sep=" ").to_numpy(object)
 
 
 def further_labels(

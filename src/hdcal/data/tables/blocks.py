@@ -5,20 +5,30 @@ between and below them: names and units, titles, remarks, summaries, and spoilt
 readings, which are kept so that their bad cells become findings.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.tables.cells import are_numbers, is_number
 from hdcal.data.tables.grid import Grid, SourceLine
 from hdcal.data.tables.headings import Heading, find_heading
-from hdcal.data.tables.other_lines import OtherLines, is_summary
+from hdcal.errors import quoted
 
 # Rows at the top, and spread over the rest, that show which columns hold numbers.
 _SAMPLE = 400
+# Rows from which a table of other columns is too large to be passed over.
+_FEWEST = 5
+_SUMMARIES = {
+    *("mean", "average", "avg", "sum", "total", "sd", "std", "stdev", "std dev"),
+    *("median", "cv", "range", "variance", "minimum", "maximum", "min", "max"),
+    *("standard deviation", "mittelwert", "summe", "standardabweichung", "stdabw"),
+    *("moyenne", "somme", "écart type", "平均", "平均值", "最大值", "最小值"),
+}
+_COMMENT = re.compile(r"[#%]")
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,96 @@ class ReadTable:
         return replace(self, grid=self.grid.take(kept), runs=runs)
 
 
+class _OtherLines:
+    """Sorting of the lines that are no readings.
+
+    Args:
+        width: cells of a reading.
+        counted: positions of the columns that hold numbers.
+
+    Attributes:
+        above: number of titles above the first reading.
+        spoilt: rows of readings with a bad cell.
+        faults: row, problem and remedy of each line that is wrong.
+    """
+
+    def __init__(self, width: int, counted: list[int]):
+        self._width, self._counted, self.above = width, counted, 0
+        self.spoilt: list[int] = []
+        self.faults: list[tuple[int, str, str]] = []
+        self._left: list[SourceLine] = []
+
+    def sort(
+        self, lines: list[SourceLine], *, titled: bool = False, below: bool = False
+    ) -> None:
+        """Sort the lines between two readings.
+
+        Args:
+            lines: in their order.
+            titled: whether a heading follows them.
+            below: whether no reading follows.
+        """
+        words, others = 0, []
+        for line in lines:
+            if self._is_spoilt(line, titled=titled):
+                self.spoilt.append(line.row)
+            elif line.counts and not line.fits and len(line.cells) == words > 1:
+                others.append(line)
+            elif _is_remark(line, titled=titled, below=below):
+                self._left.append(line)
+            else:
+                self._refuse(line)
+            words = words if line.counts else len(line.cells)
+        if len(others) >= _FEWEST:
+            problem = "a second table with other columns begins here"
+            remedy = "Split the file: one table each"
+            self.faults.append((others[0].row, problem, remedy))
+        else:
+            self._left += others
+
+    def _is_spoilt(self, line: SourceLine, *, titled: bool) -> bool:
+        """Tell whether a line is a reading with a bad cell."""
+        if not line.fits or _is_summary(line.first) or _COMMENT.match(line.first):
+            return False
+        cells = [line.cells[place] for place in self._counted]
+        if titled:
+            # Titles may hold numbers too; they begin with words.
+            return is_number(cells[0])
+        return any(map(is_number, cells)) or all(cells)
+
+    def _refuse(self, line: SourceLine) -> None:
+        """Add the fault of a line that has another number of cells."""
+        problem = f"has {len(line.cells)} cells where the header row has {self._width}"
+        remedy = f"Write {self._width} cells, or remove the line"
+        if '"' in line.first:
+            remedy += "; close each quotation mark"
+        elif len(line.cells) > self._width:
+            remedy += "; with decimal commas separate the columns by semicolons"
+        self.faults.append((line.row, problem, remedy))
+
+    @property
+    def note(self) -> tuple[str, ...]:
+        """A note on lines that are not read, if there are some."""
+        if not self._left:
+            return ()
+        rows = row_list(sorted(line.row for line in self._left))
+        return (f"no readings: {rows}, as {quoted(self._left[0].first)}",)
+
+
+def _is_remark(line: SourceLine, *, titled: bool, below: bool) -> bool:
+    """Tell whether a line is words, which may stand at this place."""
+    if _COMMENT.match(line.first) or _is_summary(line.first):
+        return True
+    if line.counts or (len(line.cells) == 1 and line.first.count('"') % 2):
+        return False
+    return titled or (below and line.numbers < 2) or line.fits
+
+
+def _is_summary(cell: str) -> bool:
+    """Tell whether a cell begins a line that sums up the readings above it."""
+    return cell.strip(" .:").lower() in _SUMMARIES
+
+
 def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
     """Return the readings of a grid under their headers."""
     sample = _sample(grid)
@@ -76,7 +176,7 @@ def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
     for line in sorted(lines):
         above = int(np.searchsorted(body.rows[clean], line.row))
         groups.setdefault(above, []).append(line)
-    others = OtherLines(grid.width, counted)
+    others = _OtherLines(grid.width, counted)
     headings = [_first_heading(groups.pop(0), grid.width, empty, others, findings)]
     total = int(clean.sum())
     for above, lines in groups.items():
@@ -102,7 +202,7 @@ def _first_heading(
     lines: list[SourceLine],
     width: int,
     empty: frozenset[int],
-    others: OtherLines,
+    others: _OtherLines,
     findings: FileFindings,
 ) -> Heading:
     """Return the heading above the first reading; without one columns are numbered.
@@ -175,7 +275,7 @@ def _summaries(words: list[str]) -> np.ndarray:
 
     One that stands in several rows below each other is a label.
     """
-    known = {word for word in {*words} if is_summary(word)}
+    known = {word for word in {*words} if _is_summary(word)}
     found = np.zeros(len(words), bool)
     for place in (i for i, word in enumerate(words) if known and word in known):
         neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
@@ -184,7 +284,7 @@ def _summaries(words: list[str]) -> np.ndarray:
 
 
 def _table(
-    grid: Grid, headings: list[Heading], empty: frozenset[int], others: OtherLines
+    grid: Grid, headings: list[Heading], empty: frozenset[int], others: _OtherLines
 ) -> ReadTable:
     """Return the readings of all blocks under the heading of the first one."""
     main, notes = headings[0], []

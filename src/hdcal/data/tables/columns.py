@@ -180,22 +180,15 @@ class _Chooser:
         return Column(quantity, header, places[0], unit, against=against)
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
-        """Return the only column of a quantity; more than one is asked about."""
-        exact = self._where(lambda h: h.exact and h.quantity == quantity)
-        good = [p for p in exact if self._headers[p].measures(quantity)]
-        if len(good) == 1:
-            return self._column(quantity, good[0])
-        if len(good) > 1:
-            names = " and ".join(quoted(self._table.headers[place]) for place in good)
-            words = f"two columns hold the {quantity}: {names}"
-            self._add(words, "Keep one of them", good[1])
-            return None
-        if exact:
-            self._ask_unit(quantity, exact[0])
-            return None
+        """Return the only column of a quantity; of several it is asked which is meant.
+
+        One that is spelt `quantity_unit` is meant rather than others.
+        """
         named = self._where(lambda h: h.quantity == quantity)
+        exact = [place for place in named if self._headers[place].exact]
+        named = exact or named
         fitting = [p for p in named if self._headers[p].measures(quantity)]
-        if not needed:
+        if not (needed or exact):
             # One that names nothing else is meant rather than one that says more.
             chosen = [p for p in fitting if self._headers[p].whole] or fitting
             return self._column(quantity, chosen[0]) if len(chosen) == 1 else None
@@ -203,7 +196,7 @@ class _Chooser:
         nameless = self._where(
             lambda h: not h.quantity and not h.excluded and h.measures(quantity)
         )
-        several = sorted([*fitting, *nameless])
+        several = fitting if exact else sorted([*fitting, *nameless])
         if len(several) == 1 and fitting:
             return self._column(quantity, fitting[0])
         if several:
@@ -230,11 +223,7 @@ class _Chooser:
         return self._column(quantity, places[0]) if len(places) == 1 else None
 
     def _label_places(self, quantity: str) -> list[int]:
-        """Return the places of the labels of a quantity, by headers and cells.
-
-        Of columns that part the rows in the same way the first one, and one that does
-        not part them only where no other does.
-        """
+        """Return the places of the labels of a quantity, by headers and cells."""
         headers = self._headers
         named = [i for i, header in enumerate(headers) if header.quantity == quantity]
         if exact := [i for i in named if headers[i].exact]:
@@ -246,6 +235,7 @@ class _Chooser:
             counted = quantity == "run" and bool((np.diff(index) != 0).all())
             if quantity not in GROUPINGS and (counted or len(texts) >= len(index)):
                 continue
+            # Of several that part the rows in the same way the first one is meant.
             kinds.setdefault(index.tobytes() if len(texts) > 1 else b"", place)
         return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
 

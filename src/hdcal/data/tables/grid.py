@@ -155,14 +155,8 @@ def memory_grid(data: Any, findings: FileFindings) -> tuple[Grid, str]:
         findings.refuse("has columns of several levels", remedy)
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
-    grid = frame_grid(frame)
-    digest = hashlib.sha256("\t".join(map(str, frame.columns)).encode())
-    for column in grid.columns:
-        if column.dtype == object:
-            digest.update("\n".join(map(stored_text, column.tolist())).encode())
-        else:
-            digest.update(column.tobytes())
-    return grid, digest.hexdigest()
+    text = frame.to_csv(index=False)
+    return frame_grid(frame), hashlib.sha256(text.encode()).hexdigest()
 
 
 def _plain_column(column: pd.Series) -> np.ndarray:

@@ -11,9 +11,8 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import is_number
 from hdcal.data.tables.grid import SEPARATORS, Grid, SourceLine, split_line
 
-LONGEST_LINE = 1 << 20
-LARGEST_FILE = 1 << 32
-_CHUNK = 1 << 18
+LARGEST_FILE = 1 << 30
+_LONG_LINE = re.compile(rb"[^\r\n]{1048577}")
 # Encodings that test machines write other than Unicode: Western Europe, China, Japan.
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
@@ -37,25 +36,19 @@ _GAP = re.compile(r"\s{2,}")
 
 
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
-    """Return the bytes of a text; give up at the first sign that it is no table.
+    """Return the bytes of a text.
 
     Raises:
         InputError: the file is binary, or has a line over 1 MiB.
     """
-    kept, line, row = [], 0, 1
-    with open(path, "rb") as stream:
-        while chunk := stream.read(_CHUNK):
-            wide = wide or (not kept and chunk.startswith(_WIDE_MARKS))
-            if not wide and b"\0" in chunk:
-                findings.refuse("is a binary file", "Save it as UTF-8 text")
-            last = max(chunk.rfind(b"\n"), chunk.rfind(b"\r"))
-            line = line + len(chunk) if last < 0 else len(chunk) - last - 1
-            if line > LONGEST_LINE:
-                row += sum(part.count(b"\n") for part in kept)
-                words = "has a line of more than 1 MiB, so it is no table of readings"
-                findings.refuse(words, "Write one row of readings per line", row)
-            kept.append(chunk)
-    return b"".join(kept)
+    raw = path.read_bytes()
+    if not (wide or raw.startswith(_WIDE_MARKS)) and b"\0" in raw:
+        findings.refuse("is a binary file", "Save it as UTF-8 text")
+    if found := _LONG_LINE.search(raw):
+        words = "has a line of more than 1 MiB, so it is no table of readings"
+        row = raw.count(b"\n", 0, found.start()) + 1
+        findings.refuse(words, "Write one row of readings per line", row)
+    return raw
 
 
 def decode(
