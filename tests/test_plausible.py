@@ -121,7 +121,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         {"direction": "sideways"},
         (
             *("deformation", "limit_force", "given_force", "temperature", "content"),
-            *("confidence", "required_probability", "seed", "tolerances"),
+            *("confidence", "seed", "tolerances"),
         ),
     ),
     (
@@ -153,17 +153,12 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         {"force": "push"},
         ("amplitude", "duration", "points", "mass", "damping", "draws", "seed"),
     ),
-    (hdcal.respond, {"force": "sine", "draws": 1}, ("frequency",)),
     (
         lambda run, **asked: hdcal.calibrate(run.case, **asked),
         {"effects": ["nothing"]},
         ("chains", "warmup", "draws", "seed"),
     ),
-    (
-        lambda run, **asked: hdcal.Tracker(run, **{"reopen": -1.0, **asked}),
-        {},
-        ("alarm_rows", "reopen"),
-    ),
+    (hdcal.Tracker, {}, ("alarm_rows",)),
     (lambda run, **asked: hdcal.fit(run.case, **asked), {}, ("degrees", "at")),
     (lambda run, **a: hdcal.causes(run.case, **{"seed": -1, **a}), {}, ("jobs",)),
 ]

@@ -130,19 +130,6 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
     raise _refused(option, words, "Write it like 0.38:0.42")
 
 
-def read_tones(text: str, option: str) -> list[float]:
-    """Read 5 or 5:200 as numbers.
-
-    Raises:
-        InputError: it is neither.
-    """
-    try:
-        return [float(part) for part in text.split(":")]
-    except ValueError:
-        remedy = "Write it like 5, or 5:200 for a chirp"
-        raise _refused(option, f"'{text}' is no frequency", remedy) from None
-
-
 def read_grid(text: str, option: str) -> list[float]:
     """Read start:stop:count or a comma list of numbers.
 

@@ -11,7 +11,7 @@ from hdcal.prediction.margin.command import margin as of_models
 # Options without a meaning for a fleet: its lines are the same in both directions, and
 # gears to come are those of its population, at the reference temperature.
 _OTHERS = ("quantity", "population", "direction", "temperature", "given_force", "seed")
-_OTHERS += ("required_probability", "tolerances", "rule", "certificate")
+_OTHERS += ("tolerances", "rule", "certificate")
 
 
 @click.pass_context

@@ -18,16 +18,9 @@ from hdcal.cli.options import json_option
     metavar="ROWS",
     help="Mean number of readings from one false alarm to the next.",
 )
-@click.option(
-    "--reopen",
-    default=0.0,
-    show_default=True,
-    metavar="SHARE",
-    help="After an alarm let the stiffness move by this share; 0.1 learns anew.",
-)
 @json_option
 @click.pass_obj
-def track(console: Console, known, **settings):
+def track(console: Console, known, alarm_rows):
     """Follow a gear reading by reading, from a calibration or diagnosis in RUN.
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
@@ -39,11 +32,11 @@ def track(console: Console, known, **settings):
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
-    tracker, bad = Tracker(load_models(known), **settings), 0
-    (mean, half), rate = tracker.stiffness, settings["alarm_rows"]
+    tracker, bad = Tracker(load_models(known), alarm_rows=alarm_rows), 0
+    mean, half = tracker.stiffness
     words = (
         f"starts at {mean:.4g} ± {half:.2g} {tracker.units.stiffness_unit} (95 %) on a "
-        f"mounting that was not tested; one false alarm in {rate:g} readings"
+        f"mounting that was not tested; one false alarm in {alarm_rows:g} readings"
     )
     console.words("\n".join([words, *tracker.notes]))
     try:
@@ -54,12 +47,12 @@ def track(console: Console, known, **settings):
     except BrokenPipeError:
         console.unread = True
         discard_output()
-    due = tracker.readings / rate
+    due = tracker.readings / alarm_rows
     console.words(
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
         f"{due:.2g} false ones are due without a change"
     )
-    if tracker.alarms and not settings["reopen"]:
-        words = "without --reopen the answers remain those of the gear before a change"
-        console.words(f"{words}, which raises more alarms; --reopen 0.1 learns it")
+    if tracker.alarms:
+        words = "the answers remain those of the gear before a change, which raises "
+        console.words(f"{words}more alarms; after a change calibrate again")
     return 2 if bad else 0

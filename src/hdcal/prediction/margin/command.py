@@ -27,12 +27,12 @@ from hdcal.errors import Finding
 @click.option(
     "--rule",
     type=click.Choice(["guarded", "simple"]),
-    help="Decision about it, by the expanded uncertainty or not [default: guarded].",
+    help="Decide by the expanded uncertainty or not [default: guarded].",
 )
 @click.option(
     "--given-force",
     type=FORCE,
-    help="Force with its sign [N] whose deformation is asked for.",
+    help="Force with its sign [N]: give the deformation that it reaches.",
 )
 @click.option(
     "--temperature",
@@ -44,11 +44,6 @@ from hdcal.errors import Finding
 )
 @click.option("--confidence", default=0.95, help="Confidence of each bound.")
 @click.option(
-    "--required-probability",
-    type=float,
-    help="Share of the population that a capacity has to hold [default: --content].",
-)
-@click.option(
     "--population",
     metavar="WHOSE",
     help="readings, mountings or specimens [default: the widest that was tested].",
@@ -57,7 +52,7 @@ from hdcal.errors import Finding
     "--quantity",
     type=click.Choice(["reading", "load"]),
     default="reading",
-    help="What the gauge shows, or what acts on the gear.",
+    help="Reading of the gauge, or load on the gear.",
 )
 @options.direction_option("Loading or unloading, in compression and in tension.")
 @options.tolerance_option
@@ -67,7 +62,7 @@ from hdcal.errors import Finding
 @click.option(
     "--certificate",
     is_flag=True,
-    help="Also write a certificate to sign, one A4 page.",
+    help="Write a certificate to sign, one A4 page, too.",
 )
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
