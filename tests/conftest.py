@@ -81,11 +81,3 @@ def few_executables() -> Iterator[None]:
         if Path("/proc/self/maps").read_bytes().count(b"\n") > 30_000:
             jax.clear_caches()
             gc.collect()
-
-
-@pytest.fixture(autouse=True)
-def fresh_traces(request: pytest.FixtureRequest) -> None:
-    """Cache and load no programs in a test that replaces code."""
-    if "monkeypatch" in request.fixturenames and "hdcal.exported" in sys.modules:
-        patch = request.getfixturevalue("monkeypatch")
-        patch.setattr("hdcal.exported._needs_plain_jit", lambda: True)

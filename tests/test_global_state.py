@@ -79,20 +79,12 @@ assert deformation.dtype == jnp.float32
 """
     + GEAR
     + "found = hdcal.force(gear, 210e3, 0.1, deformation)",
-    "theory": GEAR
-    + "from hdcal.physics.theory import THEORIES\n"
-    + "found = THEORIES['cup'](gear, 210e3)",
     "gear from another process": """
 import base64, os, pickle, jax
 gear = pickle.loads(base64.b64decode(os.environ["SENT"]))
 assert jax.config.jax_enable_x64
 from hdcal.physics.theory import THEORIES
 found = THEORIES["cup"](gear, 210e3)
-""",
-    "case": """
-import hdcal, jax.numpy as jnp
-case = hdcal.read_case("datasets/thermal-demo")
-found = jnp.asarray(case.records.force)
 """,
 }
 

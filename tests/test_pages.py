@@ -130,15 +130,3 @@ def test_the_page_of_an_effect_lists_its_parameters_and_priors():
         assert [line for line in page if line.startswith("- `")] == parameter_rows(
             effect
         )
-
-
-@pytest.mark.parametrize(
-    ("page", "below"), [("reliability", "tests"), ("architecture", "src/hdcal")]
-)
-def test_the_files_that_a_page_names_exist(page: str, below: str):
-    text = (ROOT / "docs" / "reference" / f"{page}.md").read_text("utf-8")
-    named = re.findall(r"`([\w/]+\.py)`", text)
-    assert named
-    files = [f"/{path.as_posix()}" for path in (ROOT / below).rglob("*.py")]
-    missing = [n for n in named if not any(f.endswith(f"/{n}") for f in files)]
-    assert not missing

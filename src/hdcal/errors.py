@@ -1,4 +1,4 @@
-"""The errors a user can meet: every one carries words, none needs a traceback."""
+"""Errors for users: each states what is wrong and what to do."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -7,26 +7,25 @@ from typing import ParamSpec, Self, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
-# What stands in a file may be of any length: most letters of a name or cell that is
-# quoted, of a file's name, and of a sentence, that a finding repeats.
+# Text of a file may be of any length: most characters of a quoted name or cell, of a
+# file name, and of a sentence, in a finding.
 _LONGEST_NAME, _LONGEST_FILE, _LONGEST_SENTENCE = 120, 255, 1000
 _QUOTED = re.compile(rf"(?<!\w)'[^']{{{_LONGEST_NAME + 1},}}'(?!\w)")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing wrong with an input, and what to do about it.
+    """A problem of an input, and its remedy.
 
-    A parameter of the library is written in backticks within the words; a command
-    says its own option in its place. Long names and cells are cut in their middle,
-    and characters that steer a terminal are escaped.
+    Parameters of the library are in backticks; commands replace them by their options.
+    Long names and cells are shortened, control characters escaped.
 
     Attributes:
-        file: the input the finding is about, as the user named it, or a parameter.
-        problem: what is wrong, one sentence without a full stop.
-        remedy: what to do, one sentence without a full stop.
-        row: line of the file, 1 = header line; None when it concerns the file.
-        column: header or dotted key; None when it concerns the row or file.
+        file: the input as the user named it, or a parameter.
+        problem: one sentence without a full stop.
+        remedy: one sentence without a full stop.
+        row: line of the file, 1 = header line; None if it concerns the file.
+        column: header or dotted key; None if it concerns the row or file.
     """
 
     file: str
@@ -44,7 +43,7 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """Return file, row and column, as far as they are known."""
+        """File, row and column, as far as they are known."""
         where = _shown(self.file, _LONGEST_FILE)
         if self.row is not None:
             where += f", row {self.row}"
@@ -59,27 +58,32 @@ class Finding:
 
 
 def ended(text: str) -> str:
-    """Return a sentence with its full stop; a question has its own mark."""
+    """Return a sentence with a full stop, unless it ends in ? or !."""
     return text if text.endswith(("?", "!")) else f"{text}."
 
 
 def quoted(name: str) -> str:
-    """Return a name from a file in quotes, as findings show it."""
+    """Return a name from a file in quotes, shortened and printable."""
     return f"'{_shown(name, _LONGEST_NAME)}'"
 
 
 def shortened(items: Sequence[object], most: int) -> str:
-    """Return the first items, and how many more there are: 'a, b and 3 more'."""
+    """Return the first items and the number of the others: 'a, b and 3 more'."""
     more = len(items) - most
     first = ", ".join(str(item) for item in items[:most])
     return f"{first} and {more} more" if more > 0 else first
 
 
 def _shown(text: str, longest: int) -> str:
-    """Return a text on one line, cut in its middle where it is longer."""
+    """Return a text on one line, shortened in its middle."""
     if len(text) > longest:
         half = longest // 2
         text = f"{text[:half]}…{text[-half:]}"
+    return printable(text)
+
+
+def printable(text: str) -> str:
+    """Return a text in which characters that control a terminal are escaped."""
     if text.isprintable():
         return text
     return "".join(
@@ -88,11 +92,11 @@ def _shown(text: str, longest: int) -> str:
 
 
 class HdcalError(Exception):
-    """Base of every error that hdcal raises on purpose."""
+    """Base class of the errors of hdcal."""
 
 
 class InputError(HdcalError):
-    """The input cannot be used; holds every finding, not only the first."""
+    """The input cannot be used; holds all findings."""
 
     def __init__(self, findings: Iterable[Finding]):
         self.findings = tuple(findings)
@@ -100,17 +104,17 @@ class InputError(HdcalError):
 
 
 class NotWritable(HdcalError):
-    """A result could not be written; the text states what is there."""
+    """A result could not be written."""
 
 
 class NotUsable(HdcalError):
-    """A result exists but failed its checks, so nothing may be derived from it."""
+    """A result failed its checks: nothing may be derived from it."""
 
 
 class Findings(list[Finding]):
     """Findings of several steps, reported together.
 
-    As a context it raises an `InputError` of everything that was found inside it:
+    At its end the context raises an `InputError` of all findings:
 
         with Findings() as wrong:
             case = wrong.attempt(read_case, path)
@@ -120,7 +124,7 @@ class Findings(list[Finding]):
     def attempt(
         self, make: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
     ) -> T | None:
-        """Return what is made, or None and keep why it cannot be."""
+        """Return the result of a call, or None and collect its findings."""
         try:
             return make(*args, **kwargs)
         except InputError as error:
@@ -136,5 +140,5 @@ class Findings(list[Finding]):
         elif error is not None:
             return
         if self:
-            # One gear file may be behind many cases; its faults are reported once.
+            # Many cases may share one gear file; its findings are reported once.
             raise InputError(dict.fromkeys(self)) from None

@@ -1,7 +1,4 @@
-"""Settings of JAX that computations need: double precision and whole loops.
-
-Importing hdcal changes neither; making the first `Geometry` or `Records` sets both.
-"""
+"""Settings of JAX, set by the first `Geometry` or `Records`, not by importing hdcal."""
 
 import os
 from typing import Any
@@ -18,18 +15,18 @@ _EXTRA = "xla_backend_extra_options"
 
 
 def use_double_precision(made: Any) -> None:
-    """Switch JAX to double precision and whole loops, unless it already is.
+    """Switch JAX to double precision and to compiling each small loop as one kernel.
 
-    A product of stiffness and deformation with relative error 1e-7 is larger than the
-    posterior sd at a million rows.
+    In single precision the error of a force, 1e-7 of it, exceeds the posterior sd at a
+    million rows.
 
     Args:
         made: the pytree with which a computation begins.
 
     Raises:
-        InputError: JAX is told to use a device that is not here.
-        RuntimeError: it is made inside a function that JAX compiles or differentiates,
-            whose arguments are in single precision already.
+        InputError: `JAX_PLATFORMS` names a device that is not available.
+        RuntimeError: inside a function that JAX compiles or differentiates, whose
+            arguments are in single precision already.
     """
     if jax.config.read("jax_enable_x64"):
         return
@@ -44,28 +41,23 @@ def use_double_precision(made: Any) -> None:
 
 
 def _zero() -> jax.Array:
-    """Return an array, which is a tracer inside `jax.jit`.
-
-    Raises:
-        InputError: JAX is told to use a device that is not here.
-    """
+    """Return an array, which is a tracer inside `jax.jit`."""
     try:
         return jnp.zeros(())
     except (RuntimeError, AssertionError):
         named = quoted(os.environ.get("JAX_PLATFORMS", ""))
         words = f"names {named}, which JAX cannot use here"
-        remedy = "Unset it, or name a device that is here, such as cpu"
+        remedy = "Unset it, or name an available device, such as cpu"
         raise InputError([Finding("JAX_PLATFORMS", words, remedy)]) from None
 
 
 def _compile_loops_whole() -> None:
-    """Let XLA compile each small loop as one kernel, if it has not started yet.
+    """Set the flag of XLA for whole loops, unless the user has set it.
 
-    A step of a sampler is hundreds of operations on a few numbers each: starting a
-    kernel for each operation takes two thirds of the time. Only the environment can
-    set this, and XLA reads it once. A value set by the user stands.
+    A step of the sampler is hundreds of operations on a few numbers, and starting a
+    kernel for each takes two thirds of the time. XLA reads the environment once.
     """
     flags = os.environ.get("XLA_FLAGS", "").strip()
-    # A value without a leading dash is the name of a file of flags.
+    # A value without a leading dash is a file of flags.
     if _EXTRA not in flags and flags[:1] in ("", "-"):
         os.environ["XLA_FLAGS"] = f"{flags} --{_EXTRA}={_WHOLE_LOOPS}".strip()

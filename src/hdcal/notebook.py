@@ -1,12 +1,9 @@
-"""What a notebook shows of objects whose results are made when they are needed.
-
-The maker of each result is named here, so that nothing loads before it is asked for.
-"""
+"""Objects that a notebook shows as their results, made when needed."""
 
 from importlib import import_module
 from typing import Any
 
-# Class -> what makes a `report.result.Result` of it.
+# Class -> function that makes its `report.result.Result`, imported when needed.
 RESULTS = {
     "DynamicPosterior": "motion.dynamic_result.dynamic_calibration_of",
     "Posterior": "calibration.calibration.calibration_of",
@@ -19,8 +16,8 @@ class Shown:
 
     def __repr__(self) -> str:
         result = self._result
-        said = "FAILED, do not use" if result.reasons else result.headline
-        return f"<{type(self).__name__}: {said}>"
+        text = "FAILED, do not use" if result.reasons else result.headline
+        return f"<{type(self).__name__}: {text}>"
 
     def _repr_html_(self) -> str:
         return self._result._repr_html_()
@@ -31,7 +28,7 @@ class Shown:
         return getattr(import_module(room), maker)(self)
 
     def to_frame(self) -> Any:
-        """Return the main table as a DataFrame of pandas."""
+        """Return the main table as a DataFrame."""
         return self._result.to_frame()
 
     def to_datatree(self) -> Any:
@@ -41,9 +38,5 @@ class Shown:
         return self._result.to_datatree()
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the first chart.
-
-        Args:
-            ax: where; by default new axes of pyplot.
-        """
+        """Draw the first chart on `ax`, by default on new axes of pyplot."""
         return self._result.plot(ax)

@@ -1,7 +1,7 @@
-"""Names and units of load, displacement and stiffness: a spring pressed or twisted.
+"""Names and units of load, displacement and stiffness of linear and torsional tests.
 
-Inside hdcal a torque stands where a force does and an angle where a deformation does;
-what people read takes its words and units from the `Quantities` of the case.
+Internally a torque is a force and an angle a deformation; texts take names and units
+from the `Quantities` of the case.
 """
 
 import math
@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-# What stands in texts for a name, or for a unit.
-_SAID = {
+# Placeholders of texts.
+_PLACEHOLDERS = {
     "{load}": "load",
     "{displacement}": "displacement",
     "{N}": "load_unit",
@@ -26,16 +26,9 @@ class Quantities:
     """Names and units of what was measured.
 
     Attributes:
-        load: name of the load.
-        displacement: name of the displacement.
-        stiffness: name of their ratio.
-        load_unit: unit of the load.
-        displacement_unit: unit of the displacement.
-        stiffness_unit: unit of the stiffness.
-        per: what the stiffness is per, in words.
-        finer: another unit of the stiffness with its size in `stiffness_unit`.
-        parts: replacements of the parts of names and units that are written for a
-            force and a deformation.
+        per: unit of the displacement in words.
+        finer: another unit of the stiffness, with its size in `stiffness_unit`.
+        parts: replacements of parts of names and units for force and deformation.
     """
 
     load: Literal["force", "torque"]
@@ -49,23 +42,23 @@ class Quantities:
     parts: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def unit(self, code: str) -> str:
-        """Return a unit written in N and mm, such as N*s/mm, as the unit here."""
+        """Return a unit written in N and mm, such as N*s/mm, in these units."""
         return _WORD.sub(lambda part: self._units.get(part[0], part[0]), code)
 
     def key(self, name: str) -> str:
-        """Return the name of a field or column with a unit, as stiffness_N_per_mm."""
+        """Return a field or column such as stiffness_N_per_mm in these units."""
         parts = name.split("_")
         if not {"N", "mm"} & {*parts}:
             return name
         return "_".join(self.parts.get(part, part) for part in parts)
 
     def name(self, code: str) -> str:
-        """Return the name of a covariate, or of several: deformation × direction."""
+        """Return the name of covariates such as deformation × direction."""
         return " ".join(self.parts.get(word, word) for word in code.split())
 
     def say(self, text: str) -> str:
-        """Return a text in which {load}, {N} and the like are filled in."""
-        for placeholder, name in _SAID.items():
+        """Return a text with its placeholders, such as {load} and {N}, filled in."""
+        for placeholder, name in _PLACEHOLDERS.items():
             text = text.replace(placeholder, getattr(self, name))
         return text
 

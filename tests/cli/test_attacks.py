@@ -8,9 +8,11 @@ import resource
 import shutil
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 from commands import XB1, Hdcal
 from posteriors import single
@@ -60,8 +62,8 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
     )
 
 
-def written(path: str, text: str, rng: random.Random) -> None:
-    """Write a file, in one case of three with damaged bytes."""
+def write(path: str, text: str, rng: random.Random) -> None:
+    """Write a file, in one case of three damaged."""
     raw = text.encode("utf-8", "replace")
     Path(path).write_bytes(damaged(raw, rng) if rng.random() < 0.3 else raw)
 
@@ -77,7 +79,7 @@ def attack_table(rng: random.Random, targets: Path) -> list[str]:
         lines[line][place : place + rng.randrange(2)] = [new]
     separator, end = rng.choice([",\n"] * 4 + [",;", "\t\n", "|\x85", ",\r"])
     shutil.copytree(targets / "case", "case")
-    written("case/data.csv", end.join(map(separator.join, lines)), rng)
+    write("case/data.csv", end.join(map(separator.join, lines)), rng)
     return [rng.choice(["check", "fit"]), "case"]
 
 
@@ -102,7 +104,7 @@ def attack_gear(rng: random.Random, targets: Path) -> list[str]:
         prior = f"{{ family = '{family}', {numbers}, unit = '{unit}' }}"
         lines += ["[priors]", f"{rng.choice(PRIORS)} = {prior}"]
     shutil.copytree(targets / "case", "case")
-    written("case/gear.toml", "\n".join(lines), rng)
+    write("case/gear.toml", "\n".join(lines), rng)
     return ["check", "case"]
 
 
@@ -196,34 +198,24 @@ def wrong(here: Hdcal, kind: str, seed: int, targets: Path) -> str | None:
     return f"{kind} {seed}: {found} {arguments} {printed[-500:]}" if found else None
 
 
-def attacked(here: Hdcal, kind: str, seeds: range, targets: Path) -> list[str]:
-    """Attack once for each seed, in an emptied folder; return what was wrong."""
+def chunks() -> list:
+    """Return a short range of seeds, and long ones for `make attacks`."""
+    ends = np.linspace(0, INPUTS, CHUNKS + 1).astype(int)
+    slow = [range(1_000_000 + a, 1_000_000 + b) for a, b in pairwise(ends)]
+    return [
+        range(SLICE),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in slow),
+    ]
+
+
+@pytest.mark.parametrize("seeds", chunks())
+@pytest.mark.parametrize("kind", ATTACKS)
+def test_an_attack_is_answered_or_refused(here: Hdcal, targets, kind, seeds):
     found = []
-    for seed in seeds:
+    share = 1.0 if len(seeds) == SLICE else ATTACKS[kind][1]
+    for seed in seeds[: round(share * len(seeds))]:
         for path in Path().iterdir():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         found.append(wrong(here, kind, seed, targets))
-    return [each for each in found if each]
-
-
-@pytest.mark.parametrize("kind", ATTACKS)
-def test_a_slice_of_attacks_is_answered_or_refused(here: Hdcal, targets, kind):
-    assert attacked(here, kind, range(SLICE), targets) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("chunk", range(CHUNKS))
-@pytest.mark.parametrize("kind", ATTACKS)
-def test_every_attack_is_answered_or_refused(here: Hdcal, targets, kind, chunk):
-    count = round(INPUTS * ATTACKS[kind][1] / CHUNKS)
-    first = 1_000_000 + chunk * count
-    assert attacked(here, kind, range(first, first + count), targets) == []
+    assert not any(found), [each for each in found if each]
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < MOST_KIB
-
-
-def test_an_internal_error_is_noticed(here: Hdcal, targets, monkeypatch):
-    def defect(*_, **__):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr("hdcal.data.reading.read_case", defect)
-    assert "internal error" in str(wrong(here, "gear", 0, targets))

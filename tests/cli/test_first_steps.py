@@ -9,7 +9,6 @@ import pytest
 from commands import Hdcal
 
 import hdcal as library
-from hdcal.data.resources import priors_folder
 
 LOG = "Weg [mm];Kraft [kN]\n" + "".join(f"0,{k}5;0,0{k}1\n" for k in range(1, 8))
 SIZES = ["--wall", ".68", "--radius", "40", "--length", "70"]
@@ -35,12 +34,11 @@ def test_check_writes_a_gear_file_of_what_it_read(here: Hdcal, log: Path):
     assert again.returncode == 2 and not (log.parent / "other.toml").exists()
 
 
-@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_check_draws_the_readings(here: Hdcal, log: Path, ending, begins):
-    picture = log.with_suffix(f".{ending}")
+def test_check_draws_the_readings(here: Hdcal, log: Path):
+    picture = log.with_suffix(".png")
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
         assert here("check", log, "--plot", picture, *more).returncode == code
-    assert picture.read_bytes().startswith(begins)
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert here("check", log, "--plot", log.with_suffix(".pdf")).returncode == 2
     # A file of another program is never replaced.
     picture.write_text("mine")
@@ -77,22 +75,6 @@ def test_init_writes_a_sheet_of_a_workbook(here: Hdcal, tmp_path: Path):
     assert len(library.read_case(tmp_path / "rig").records.force) == 8
 
 
-def test_init_keeps_named_columns_and_a_new_material(here: Hdcal, tmp_path: Path):
-    rows = "".join(f"{0.05 * k:.2f},{5 * k}\n" for k in range(8))
-    (tmp_path / "log.csv").write_text("a,b\n" + rows)
-    given = (*BEGUN, "--data", tmp_path / "log.csv")
-    assert here("init", tmp_path / "rig", *given).returncode == 2
-    text = (priors_folder() / "steel.toml").read_text("utf-8")
-    (tmp_path / "my.toml").write_text(text)
-    named = ["--column", "deformation=a[mm]", "--column", "force=b[N]"]
-    named += ["--material", "my.toml"]
-    assert here("init", tmp_path / "rig", *given, *named).returncode == 0
-    assert library.read_case(tmp_path / "rig").records.force[-1] == 35.0
-    assert here("init", tmp_path / "later", *BEGUN, *named).returncode == 0
-    (tmp_path / "later" / "data.csv").write_text("a,b\n" + rows)
-    assert library.read_case(tmp_path / "later").records.force[-1] == 35.0
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -102,10 +84,8 @@ def test_init_keeps_named_columns_and_a_new_material(here: Hdcal, tmp_path: Path
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
         ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),
         (["--wall", "0,68", *BEGUN[2:]], "'0,68' is no number: write 0.68"),
-        (["--wall", "1,234.5", *BEGUN[2:]], "'1,234.5' is no number"),
         (["--wall", "inf", *BEGUN[2:]], "'inf' is no number"),
         ([*BEGUN, "--data", "nowhere.csv", "--column", "force"], "--column: "),
-        ([*BEGUN, "--sheet", "A"], "--sheet: "),
     ],
 )
 def test_init_refuses_bad_input(here: Hdcal, tmp_path, given, words):

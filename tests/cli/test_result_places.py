@@ -14,9 +14,7 @@ from hdcal.report.saving import Target
 WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
-    ["fit", XB1],
     ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
-    ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
 ]
 
 
@@ -49,20 +47,6 @@ def test_a_table_of_another_program_is_kept(here: Hdcal, calibrated, tmp_path: P
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
         assert here(*asked, "bands.csv", *more).returncode == code
     assert {*os.listdir(tmp_path)} == {"readings.csv", "bands.csv"}
-
-
-def test_an_interruption_after_writing_names_the_result(
-    here: Hdcal, monkeypatch, tmp_path: Path
-):
-    def interrupted(*_) -> None:
-        assert (tmp_path / "run" / "fit.json").exists()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("hdcal.report.terminal_text.terminal_parts", interrupted)
-    done = here("fit", XB1, "--out", "run")
-    assert done.returncode == 130 and not done.stdout
-    assert done.stderr.strip() == "hdcal: interrupted: run is written"
-    assert os.listdir(tmp_path) == ["run"]
 
 
 def test_a_folder_that_appears_during_the_work_is_kept(

@@ -13,60 +13,48 @@ def seen(calibrated: tuple[Done, object], tmp_path_factory) -> Seen:
 
 
 def test_screens_show_charts_and_paper_the_images(seen: Seen):
-    drawn = {place: len(frame["images"]) for place, frame in seen.frames.items()}
-    assert drawn == {"phone": 0, "desk": 0, "paper": 4}
-    # Bands, residuals, priors and ranks.
-    assert seen.frames["desk"]["canvases"] == 2 + 2 + 6 + 6
+    images = {place: len(frame["images"]) for place, frame in seen.frames.items()}
+    # Bands and residuals are interactive, densities are not.
+    assert images == {"phone": 1, "desk": 1, "paper": 3}
+    assert seen.frames["desk"]["canvases"] == 2 + 2
     assert not seen.complaints and not seen.requests
 
 
-SWATCHES = """
-const rows = [...page.querySelector(".u-legend").querySelectorAll(".u-series")];
-return rows.filter(row => row.offsetHeight > 0 && row.querySelector(".u-marker"))
-  .map(row => [row.innerText.trim(),
-    page.defaultView.getComputedStyle(row.querySelector(".u-marker")).backgroundColor]);
-"""
-
-
-def test_no_two_rows_of_a_legend_look_alike(calibrated, tmp_path):
-    first = play(calibrated[1] / "report.html", tmp_path, SWATCHES)
-    assert len(first) >= 4
-    assert len({words for words, _ in first}) == len({hue for _, hue in first})
-    assert len({words for words, _ in first}) == len(first)
-
-
-TURN = """
-const all = name => [...page.querySelectorAll(name)];
-const canvas = all("canvas"), over = all(".u-over");
+ACT = """
+const all = name => [...page.querySelectorAll(name)], frame = page.defaultView;
+const over = all(".u-over"), canvas = all("canvas");
 const pictures = () => canvas.map(each => each.toDataURL());
 const later = () => new Promise(done => setTimeout(done, 300));
+const box = over[0].getBoundingClientRect();
+const act = (kind, x, target = over[0]) => target.dispatchEvent(
+  new MouseEvent(kind, {clientX: box.x + x, clientY: box.y + 100, movementX: 9,
+    bubbles: true, cancelable: true}));
 await later();
 const first = pictures();
-const box = over[0].getBoundingClientRect();
-const at = {clientX: box.x + 300, clientY: box.y + 100, bubbles: true,
-  cancelable: true};
-over[0].dispatchEvent(new WheelEvent("wheel", {deltaY: -100, ...at}));
+act("mousemove", 200);
 await later();
-const turned = pictures();
-over[0].dispatchEvent(new MouseEvent("mousemove", at));
+const rows = [...page.querySelector(".u-legend").querySelectorAll(".u-series")]
+  .filter(each => each.offsetHeight > 0);
+const legend = rows.map(each => each.innerText);
+const colours = rows.filter(row => row.querySelector(".u-marker")).map(row =>
+  [row.querySelector(".u-label").innerText,
+   frame.getComputedStyle(row.querySelector(".u-marker")).backgroundColor]);
+act("mousedown", 200); act("mousemove", 400); act("mouseup", 400, page);
 await later();
-const rows = all(".u-legend .u-series").filter(each => each.offsetHeight > 0);
-const told = rows.map(each => each.innerText);
-over[1].dispatchEvent(new MouseEvent("dblclick", at));
-over[0].dispatchEvent(new MouseEvent("dblclick", at));
+const zoomed = pictures();
+over.slice(0, 2).forEach(each => act("dblclick", 300, each));
 await later();
-return {turned: turned.map((each, k) => each !== first[k]),
-  back: pictures().map((each, k) => each === first[k]), told: told};
+return {zoomed: zoomed.map((each, k) => each !== first[k]),
+  back: pictures().map((each, k) => each === first[k]), legend, colours};
 """
 
 
-def test_the_wheel_zooms_both_and_two_clicks_show_all(calibrated, tmp_path):
-    found = play(calibrated[1] / "report.html", tmp_path, TURN)
-    assert found["turned"] == [True, True] + 14 * [False]
-    assert all(found["back"])
-    said = [" ".join(row.split()) for row in found["told"]]
-    assert sum(bool(re.search(r" ?-?\d", row)) for row in said) >= 4
-    # Both ends of a band stand in one row, under the name of the band.
-    ends = [row for row in said if "…" in row]
-    assert len(ends) >= 2 and not any("2.5 %" in row for row in said)
-    assert re.search(r"mean force ?[-\d.]+ … [-\d.]+", " ".join(ends))
+def test_dragging_zooms_both_panels_and_the_legend_shows_values(calibrated, tmp_path):
+    found = play(calibrated[1] / "report.html", tmp_path, ACT)
+    assert found["zoomed"] == [True, True, False, False] and all(found["back"])
+    legend = [" ".join(row.split()) for row in found["legend"]]
+    assert sum(bool(re.search(r" ?-?\d", row)) for row in legend) >= 4
+    # Both ends of a band are in one row, under the name of the band.
+    assert re.search(r"mean force[^|]* ?[-\d.]+ … [-\d.]+", " | ".join(legend))
+    labels, colours = zip(*found["colours"], strict=True)
+    assert len(labels) == len(set(labels)) == len(set(colours)) >= 4

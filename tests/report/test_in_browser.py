@@ -49,32 +49,25 @@ def seen(report: Path, tmp_path_factory) -> Seen:
 @pytest.mark.parametrize("place", WIDTHS)
 def test_every_figure_shows(seen: Seen, place: str):
     frame = seen.frames[place]
-    # On a screen charts that one can touch stand for some.
-    assert len(frame["images"]) + frame["canvases"] * (place != "paper") >= 3
+    # On a screen interactive charts replace some.
+    canvases = 0 if place == "paper" else frame["canvases"]
+    assert len(frame["images"]) + canvases >= 3
     for image in frame["images"]:
         assert image["natural"] > 0
         room = min(WIDTHS[place], image["natural"])
         assert 0.5 * room < image["width"] <= room
         assert image["height"] > 50
     assert frame["text"] > 1000
-    # One answer first: the rest is folded, but on paper.
+    # Details are folded, but on paper.
     assert frame["first"] < (1500 if place != "paper" else 1e6)
     assert frame["first"] == frame["text"] or place != "paper"
 
 
-@pytest.mark.parametrize("place", WIDTHS)
-def test_nothing_is_wider_than_the_page(seen: Seen, place: str):
-    frame = seen.frames[place]
-    assert frame["width"] <= WIDTHS[place], frame["past"]
-    assert not frame["past"]
-
-
-def test_the_browser_has_nothing_to_complain_of(seen: Seen):
-    assert not seen.complaints
-
-
-def test_nothing_is_asked_of_the_network(seen: Seen):
-    assert not seen.requests
+def test_it_fits_without_complaints_or_requests(seen: Seen):
+    for place, width in WIDTHS.items():
+        frame = seen.frames[place]
+        assert frame["width"] <= width and not frame["past"], frame["past"]
+    assert not seen.complaints and not seen.requests
 
 
 def test_it_can_be_printed(report: Path, tmp_path: Path):
@@ -126,38 +119,13 @@ def _directives(line: str) -> list[str]:
     return re.findall(r"\b(?:script|img|style|default)-src\b", line)
 
 
-@pytest.mark.thorough
-def test_the_page_looks_the_same_without_its_policy(reports, tmp_path: Path):
-    seen = look(reports["none"], tmp_path)
-    assert planted(reports["none"], tmp_path, "").frames == seen.frames
-
-
-@pytest.mark.parametrize("scheme", ["http", "https"])
-def test_a_planted_request_is_caught(reports, tmp_path: Path, scheme: str):
-    words = f'<img src="{scheme}://example.invalid/x.png" alt="">'
-    seen = planted(reports["none"], tmp_path, words)
-    assert any("example.invalid" in request for request in seen.requests)
-    assert any(image["natural"] == 0 for image in seen.frames["desk"]["images"])
-
-
-def test_a_planted_error_is_caught(reports, tmp_path: Path):
-    seen = planted(reports["none"], tmp_path, "<script>undefined.planted</script>")
-    assert any("planted" in line for line in seen.complaints)
-
-
-def test_a_planted_overflow_is_caught(reports, tmp_path: Path):
-    words = '<p style="width: 1000px">planted</p>'
-    seen = planted(reports["none"], tmp_path, words)
-    assert seen.frames["phone"]["width"] > PHONE
-    assert seen.frames["paper"]["width"] > PAPER
-    assert any("planted" in node for node in seen.frames["phone"]["past"])
-    assert not seen.frames["desk"]["past"]
-
-
-def test_a_planted_wide_table_is_caught_on_paper_only(reports, tmp_path: Path):
-    # On a phone such a table scrolls by itself; paper cannot.
+def test_planted_faults_are_caught(reports, tmp_path: Path):
+    # On a phone a wide table scrolls, paper cannot.
     words = '<div class="wide"><table><td style="min-width: 900px">x</td></table></div>'
     seen = planted(reports["none"], tmp_path, words)
-    assert not seen.frames["phone"]["past"]
-    assert seen.frames["phone"]["width"] <= PHONE
-    assert seen.frames["paper"]["past"]
+    assert not seen.frames["phone"]["past"] and seen.frames["paper"]["past"]
+    words = '<p style="width: 1000px">wide</p><script>undefined.planted</script>'
+    seen = planted(reports["none"], tmp_path, words)
+    assert any("planted" in line for line in seen.complaints)
+    assert seen.frames["phone"]["width"] > PHONE and seen.frames["phone"]["past"]
+    assert not seen.frames["desk"]["past"]

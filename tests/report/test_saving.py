@@ -27,16 +27,8 @@ def test_a_folder_is_there_only_when_it_is_complete(tmp_path: Path):
             assert not (tmp_path / "run").exists()
         assert content(tmp_path / "run").keys() == {"summary.json", MARKER}
     assert os.listdir(tmp_path) == ["run"]
-
-
-def test_the_marker_lists_the_content(tmp_path: Path):
-    write_folder(tmp_path / "run", "new")
-    write_folder(tmp_path / "again", "new")
-    marker = (tmp_path / "run" / MARKER).read_bytes()
-    digest = sha256(b"new").hexdigest()
-    files = {"case": "folder", "case/verdict.json": digest, "summary.json": digest}
-    assert json.loads(marker)["files"] == files
-    assert (tmp_path / "again" / MARKER).read_bytes() == marker
+    marker = json.loads((tmp_path / "run" / MARKER).read_text())
+    assert marker["files"] == {"summary.json": sha256(b"{}").hexdigest()}
 
 
 @pytest.mark.parametrize("write", [write_folder, write_file])
@@ -51,7 +43,7 @@ def test_a_result_is_replaced_with_force_only(write: Callable, tmp_path: Path):
 
 
 @pytest.mark.parametrize("older", [False, True])
-@pytest.mark.parametrize("error", [ValueError(), KeyboardInterrupt(), FULL])
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), FULL])
 def test_a_failure_changes_nothing(error: BaseException, older: bool, tmp_path: Path):
     if older:
         write_folder(tmp_path / "run", "old")
@@ -120,10 +112,11 @@ def test_impossible_targets_are_refused(tmp_path: Path):
         with pytest.raises(InputError):
             Target(name, force=True)
     os.mkfifo(tmp_path / "pipe")
-    for name in ("pipe", "."):
+    (tmp_path / "readings.csv").write_text("deformation,force\n")
+    for name in ("pipe", ".", "readings.csv"):
         with pytest.raises(InputError, match="is not a file that hdcal wrote"):
             Target(f"{tmp_path}/{name}", force=True, beginning=b"x")
-    assert set(os.listdir(tmp_path)) == {"file", "pipe"}
+    assert set(os.listdir(tmp_path)) == {"file", "pipe", "readings.csv"}
 
 
 FOREIGN: dict[str, Callable[[Path], object]] = {
@@ -153,7 +146,7 @@ def test_what_hdcal_did_not_write_is_kept(name: str, tmp_path: Path):
     assert (tmp_path / "run").is_dir() and not list(tmp_path.glob(".hdcal*"))
 
 
-@pytest.mark.parametrize("name", FOREIGN)
+@pytest.mark.parametrize("name", ["thesis.txt", "summary.json"])
 def test_what_is_changed_during_the_work_is_kept(name: str, tmp_path: Path):
     write_folder(tmp_path / "run", "old")
     (tmp_path / "run-2").touch()
@@ -179,13 +172,6 @@ def test_a_file_that_appears_during_the_work_is_kept(tmp_path: Path):
         (tmp_path / "a.csv").write_text("mine")
         file.write_text("new")
     assert content(tmp_path) == {"a.csv": "mine", "a-2.csv": "new"}
-
-
-def test_a_file_with_another_beginning_is_kept(tmp_path: Path):
-    (tmp_path / "readings.csv").write_text("deformation,force\n")
-    with pytest.raises(InputError, match="is not a file that hdcal wrote"):
-        write_file(tmp_path / "readings.csv", "new")
-    assert content(tmp_path) == {"readings.csv": "deformation,force\n"}
 
 
 @pytest.mark.parametrize("name", ["link", "there/../link", "there/run"])

@@ -21,7 +21,7 @@ from hdcal.prediction.bands.predict import default_bands
 from hdcal.prediction.bands.result import Bands
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.report.charts.chart_spec import Chart
-from hdcal.report.charts.draws_charts import prior_chart, rank_chart
+from hdcal.report.charts.draws_charts import prior_chart
 from hdcal.report.item import Interval, Item, Words, quantity
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,
@@ -139,13 +139,12 @@ class Calibration(PosteriorResult):
         return default_bands(self.posterior)
 
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return bands with readings, residuals, priors and ranks."""
+        """Return bands with readings, residuals and priors."""
         posterior, left = self.posterior, self.left
         return {
             "calibration": calibration_chart(posterior, self.bands, left),
             "residuals": residual_chart(left, posterior.case.run_labels),
             "priors": prior_chart(posterior),
-            "sampler": rank_chart(posterior),
         }
 
 

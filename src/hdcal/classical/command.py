@@ -8,7 +8,7 @@ from hdcal.cli.option_types import LENGTH, NUMBERS
 from hdcal.cli.options import case_options, json_option, out_option, read_given
 
 
-@command(short_help="Classical polynomial fits, with their errors.")
+@command(short_help="Fit polynomials by least squares.")
 @case_options
 @click.option(
     "--degree",
@@ -16,12 +16,12 @@ from hdcal.cli.options import case_options, json_option, out_option, read_given
     type=NUMBERS,
     default="1,2,3",
     show_default=True,
-    help="Degrees, 1 to 9; each is fitted with an intercept and without.",
+    help="Fit these degrees, 1 to 9, each with and without an intercept.",
 )
 @click.option(
     "--at",
     type=LENGTH,
-    help="Compare forces at this deformation [default: the gear's nominal one].",
+    help="Compare forces at this deformation [default: the nominal one].",
 )
 @out_option
 @json_option

@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster; the workers need no shared disk."""
+"""Tasks on a Dask cluster."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -10,33 +10,30 @@ from typing import Any
 from hdcal.errors import Finding, HdcalError, InputError
 
 _SECONDS_TO_ANSWER, _SECONDS_FOR_A_WORKER = 10, 30
-# Tasks per thread of the cluster that wait there with their data, and no more.
+# Tasks per thread that are sent in advance.
 _AHEAD = 2
-_GO_ON = "what was answered is kept; run the same command again to go on"
 
 
 def completed_on_cluster(
-    work: Callable, tasks: Iterator[tuple], address: str, lost: str = _GO_ON
+    work: Callable, tasks: Iterator[tuple], address: str, lost: str
 ) -> Iterator[Any]:
-    """Yield the result of `work` for every task, in the order in which they end.
-
-    Tasks of a lost worker go to another one; each result comes once.
+    """Yield the result of `work` for every task, in the order of completion.
 
     Args:
         work: can be imported by name on the workers.
         tasks: its arguments; taken as workers become free.
         address: of the scheduler.
-        lost: what to do where the cluster is lost.
+        lost: remedy if the cluster is lost.
 
     Raises:
-        InputError: Dask is not installed, or nobody answers or works there.
-        HdcalError: the cluster was lost, or a task has cost several workers.
+        InputError: Dask is not installed, or there is no scheduler or no worker.
+        HdcalError: the cluster was lost, or a task has killed several workers.
     """
     with _client(address) as client:
         from distributed import KilledWorker, as_completed
 
         width = _AHEAD * max(1, sum(client.nthreads().values()))
-        # Equal tasks are two tasks: what comes back is counted.
+        # Impure: equal tasks are run separately.
         begun = (client.submit(work, *task, pure=False) for task in tasks)
         waiting = as_completed(list(islice(begun, width)), loop=client.loop)
         try:
@@ -46,10 +43,10 @@ def completed_on_cluster(
                 waiting.update(list(islice(begun, 1)))
                 yield outcome
         except KilledWorker as error:
-            words = "one task has cost several workers their life (memory?)"
+            words = "one task has killed several workers (memory?)"
             raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
         except (CancelledError, OSError) as error:
-            words = "the scheduler went away"
+            words = "the connection to the scheduler was lost"
             raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
 
 
@@ -60,8 +57,8 @@ def _client(address: str) -> Iterator[Any]:
     except ImportError:
         words = "Dask's package 'distributed' is not installed"
         raise _refusal(words, "Install hdcal[cluster], or leave it out") from None
-    # A lost connection is reported once, where it is caught. Dask gives
-    # its loggers levels and handlers of their own, so that no parent quiets them.
+    # A lost connection is reported once, as an error. Dask's loggers have levels and
+    # handlers of their own.
     for name in list(logging.root.manager.loggerDict):
         if name.startswith("distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -1,4 +1,4 @@
-"""A command that reports findings about parameters as findings about options."""
+"""Command whose findings name its options in place of the library's parameters."""
 
 import re
 from dataclasses import replace
@@ -8,19 +8,15 @@ import click
 
 from hdcal.errors import Finding, InputError
 
-# How findings write a parameter within their words.
+# A parameter within the text of a finding.
 _NAMED = re.compile(r"`(\w+)`")
 
 
 class Command(click.Command):
-    """A command whose findings name its options instead of the parameters."""
+    """A command whose findings name options."""
 
     def invoke(self, ctx: click.Context):
-        """Run the command.
-
-        Raises:
-            InputError: with options in place of the library's parameters.
-        """
+        """Run the command; an `InputError` names options."""
         options = {p.name: _shown(p) for p in self.params if p.name is not None}
         try:
             return super().invoke(ctx)
@@ -29,18 +25,16 @@ class Command(click.Command):
 
 
 def _of_options(finding: Finding, options: dict[str, str]) -> Finding:
-    """Return a finding with options in place of the library's parameters."""
-
     def words(text: str) -> str:
         return _NAMED.sub(lambda name: options.get(name[1], name[0]), text)
 
     file = finding.file if finding.row else options.get(finding.file, finding.file)
-    said = {"problem": words(finding.problem), "remedy": words(finding.remedy)}
-    return replace(finding, file=file, **said)
+    problem, remedy = words(finding.problem), words(finding.remedy)
+    return replace(finding, file=file, problem=problem, remedy=remedy)
 
 
 def _shown(parameter: click.Parameter) -> str:
-    """Return a parameter as users write it: --option, or the name of an argument."""
+    """Return a parameter as users write it: --option or ARGUMENT."""
     if isinstance(parameter, click.Option):
         return parameter.opts[0]
     return parameter.human_readable_name.strip("[]")

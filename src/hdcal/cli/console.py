@@ -1,7 +1,7 @@
 """Output of a command: results on standard output, messages on standard error."""
 
-import contextlib
 import io
+import json
 import logging
 import os
 import shlex
@@ -10,20 +10,19 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdcal.errors import Finding, Findings, quoted
-from hdcal.report.plain import as_json, printable
+from hdcal.errors import Finding, Findings, printable, quoted
 
 if TYPE_CHECKING:
     from hdcal.report.result import Result
     from hdcal.report.saving import Target
 
 
-def _read_too(out: str) -> list[Finding]:
-    """Return a finding where a result would replace its own input."""
+def _would_replace_input(out: str) -> list[Finding]:
+    """Return a finding if the result would replace an input of the command."""
     context = click.get_current_context(silent=True)
     if context is None:
         return []
@@ -34,32 +33,25 @@ def _read_too(out: str) -> list[Finding]:
             read += [given] if isinstance(given, str) else given
     if os.path.realpath(out) not in map(os.path.realpath, read):
         return []
-    return [Finding("out", f"{quoted(out)} is read too", "Name another folder")]
+    return [Finding("out", f"{quoted(out)} is also an input", "Name another folder")]
 
 
 class Console:
-    """The two streams of one command.
+    """The two output streams of one command.
 
-    Args:
+    Attributes:
         json: whether standard output carries one JSON object and nothing else.
+        wrong: findings about options and input, collected before the work.
+        folder: where the result goes; set by `reserve_folder`.
     """
 
     def __init__(self, *, json: bool):
         self.json = json
-        # Findings about options and input, collected before the work.
         self.wrong = Findings()
-        # Where the result goes; `reserve_folder` sets it.
         self.folder: Target | None = None
-        # Whether the reader of the output is gone.
-        self.unread = False
 
     def prepare(self) -> None:
-        """Quiet the libraries, and let any text be printed on any terminal."""
-        # Closed ones are None.
-        sys.stdout, sys.stderr = (
-            stream or open(os.devnull, "w")  # noqa: SIM115, as long as the process
-            for stream in (sys.stdout, sys.stderr)
-        )
+        """Suppress messages of libraries; let any text be printed on any terminal."""
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
@@ -74,7 +66,7 @@ class Console:
 
     @property
     def command(self) -> str:
-        """Return the command line for a result's provenance.
+        """The command line, for a result's provenance.
 
         Without --jobs: the same result has the same bytes.
         """
@@ -94,19 +86,19 @@ class Console:
         Args:
             out: the folder to make, or None.
             force: whether an older result may be replaced.
-            replace: the parameter that says so.
+            replace: name of the parameter that allows it.
         """
         if out is not None:
             from hdcal.report.saving import Target
 
-            self.wrong += _read_too(out)
+            self.wrong += _would_replace_input(out)
             self.folder = self.hold(partial(Target, out, force, replace))
 
     def hold(self, reserve: "Callable[[], Target]") -> "Target | None":
-        """Return a target that is held until the command ends, or None.
+        """Return a target that is locked until the command ends, or None.
 
         Args:
-            reserve: makes the target; the findings of its refusal are collected.
+            reserve: makes the target; findings are collected.
         """
         target = self.wrong.attempt(reserve)
         if target is not None:
@@ -114,11 +106,11 @@ class Console:
         return target
 
     def show(self, result: "Result", **files: Any) -> int:
-        """Write the reserved folder if there is one, print a result, return its code.
+        """Write the reserved folder, if any; print the result; return the exit code.
 
         Args:
             result: what to write and print.
-            files: what `write_result` takes: names and content of the files.
+            files: further arguments of `write_result`.
         """
         if self.folder is not None:
             from hdcal.report.result_folder import write_result
@@ -127,11 +119,7 @@ class Console:
         return self.show_written(result)
 
     def show_written(self, result: "Result") -> int:
-        """Print a result whose folder is written, and return the command's exit code.
-
-        Args:
-            result: what to print.
-        """
+        """Print a result whose folder is written; return the exit code."""
         from hdcal.report.terminal_text import terminal_parts
 
         folder = None if self.folder is None else self.folder.name
@@ -141,30 +129,30 @@ class Console:
         return 0 if result.status == "ok" else 1
 
     def result(self, text: str) -> None:
-        """Print the result for people; with --json it moves to standard error."""
+        """Print the result for people; with --json to standard error."""
         self._print(text, to_error=self.json)
 
     def data(self, plain: dict[str, Any]) -> None:
-        """Print the one JSON object."""
-        self._print(as_json(plain).rstrip(), to_error=False)
+        """Print the JSON object."""
+        self._print(json.dumps(plain, indent=2, allow_nan=False), to_error=False)
 
     def words(self, text: str) -> None:
-        """Print a remark."""
+        """Print a message."""
         lines = "\n".join(printable(line) for line in text.splitlines())
         self._print(f"hdcal: {lines}", to_error=True)
 
     def findings(
         self, findings: Iterable[Finding], show: Callable[[], None] | None = None
     ) -> None:
-        """Print every finding, and as JSON where that was asked for.
+        """Print every finding, and as JSON if --json was given.
 
         Args:
             findings: what is wrong.
-            show: prints them for people; by default each becomes one line.
+            show: prints them for people; by default each is one line.
         """
         listed = list(findings)
         if show is not None:
-            _to_error(show)
+            show()
         for finding in listed if show is None else ():
             self.words(str(finding))
         if self.json:
@@ -177,59 +165,17 @@ class Console:
             self.data({"status": status, "reasons": [text]})
 
     def table(self, *parts: Any) -> None:
-        """Print rich's tables and texts as the result for people."""
-        from rich.console import Console as RichConsole
+        """Print rich tables and texts as the result for people."""
+        from hdcal.report.terminal_text import drawn
 
         terminal = (sys.stderr if self.json else sys.stdout).isatty()
-        # Outside a terminal rich would guess 80 columns and break the tables.
-        width = None if terminal else 110
-        # Not the stream itself: rich would write to it, and end the process by itself
-        # where that fails.
-        drawn = io.StringIO()
-        rich = RichConsole(
-            file=drawn,
-            force_terminal=terminal or None,
-            width=width,
-            highlight=False,
-            emoji=False,
-        )
-        rich.print(*parts, sep="\n")
-        lines = (line.rstrip() for line in drawn.getvalue().splitlines())
-        self.result("\n".join(lines))
+        # Outside a terminal rich would assume 80 columns and break the tables.
+        self.result(drawn(parts, None if terminal else 110, colours=terminal))
 
     def _print(self, text: str, *, to_error: bool) -> None:
-        if to_error:
-            _to_error(partial(print, text, file=sys.stderr, flush=True))
-            return
-        try:
-            print(text, flush=True)
-        except BrokenPipeError:
-            self.unread = True
-            discard_output()
-
-
-def _to_error(show: Callable[[], None]) -> None:
-    """Show something on standard error, if anything can be shown there."""
-    try:
-        show()
-    except OSError:
-        # A message that cannot be written cannot be reported either.
-        _discard(sys.stderr)
+        print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
 
 
 def discard_output() -> None:
-    """Send standard output nowhere, once its reader is gone."""
-    _discard(sys.stdout)
-
-
-def _discard(stream: TextIO) -> None:
-    # Python would complain again when it flushes.
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def usage_error(error: click.UsageError) -> Finding:
-    """Return a mistake on the command line as a finding."""
-    command = error.ctx.command_path if error.ctx else "hdcal"
-    remedy = f"See {command} --help"
-    return Finding("command line", error.format_message().rstrip("."), remedy)
+    """Redirect standard output to nowhere: flushing it again would fail again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

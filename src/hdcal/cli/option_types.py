@@ -1,4 +1,8 @@
-"""Texts behind options as values: numbers with units, ranges, lists and names."""
+"""Values of options: numbers with units, ranges, lists, and names with values.
+
+Each `read_…` takes the text of the user and the option's name, and raises an
+`InputError` that says how to write the value.
+"""
 
 import math
 import re
@@ -25,7 +29,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?0,\d+\s*")
 
 
 class Parsed(click.ParamType):
-    """An option's text, read by hdcal; errors are reported together.
+    """An option read by a function; its findings are collected by the console.
 
     Args:
         name: shown in the help.
@@ -41,18 +45,14 @@ class Parsed(click.ParamType):
         return self.name
 
     def convert(self, value, param, ctx):
-        """Return what was read, or None where the text cannot be."""
+        """Return the value, or None if the text cannot be read."""
         if not isinstance(value, str) or param is None or ctx is None:
             return value
         return ctx.obj.wrong.attempt(self._read, value, param.opts[0])
 
 
 def read_all(read: Callable[[Sequence[str], str], T]):
-    """Return a callback that reads all texts of an option that may be repeated.
-
-    Args:
-        read: called with the texts and the option's name; raises `InputError`.
-    """
+    """Return a callback that reads all texts of an option that may be repeated."""
 
     def callback(context: click.Context, option: click.Parameter, texts) -> T | None:
         return context.obj.wrong.attempt(read, texts, option.opts[0])
@@ -60,40 +60,26 @@ def read_all(read: Callable[[Sequence[str], str], T]):
     return callback
 
 
-def _refused(option: str, words: str, remedy: str) -> InputError:
-    return InputError([Finding(option, words, remedy)])
+def _refused(option: str, problem: str, remedy: str) -> InputError:
+    return InputError([Finding(option, problem, remedy)])
 
 
 class InUnit(float):
-    """A number in N or mm that was written with its unit."""
+    """A number in N or mm that was given with its unit."""
 
 
 def unit_findings(units: Quantities, **given: float | None) -> Iterator[Finding]:
-    """Yield options that were written in N or mm where torques were measured.
-
-    Args:
-        units: of what was measured.
-        given: options by name.
-    """
+    """Yield a finding for each option given in N or mm where torques were measured."""
     for name, value in given.items():
         if isinstance(value, InUnit) and not units.is_force:
-            words = f"is given in the unit of a force or a length, and {units.load}s "
-            words += f"over {units.displacement}s were measured"
-            here = f"{units.displacement_unit} or {units.load_unit}"
-            yield Finding(name, words, f"Write the number alone, in {here}")
+            problem = "is in the unit of a force or a length, but the data are "
+            problem += f"{units.load}s over {units.displacement}s"
+            unit = f"{units.displacement_unit} or {units.load_unit}"
+            yield Finding(name, problem, f"Write the number without unit, in {unit}")
 
 
 def read_quantity(text: str, option: str, *, unit: str) -> float:
-    """Read a number, alone in a code unit or with a unit behind it: 70, 0.07 kN.
-
-    Args:
-        text: as the user wrote it.
-        option: where it stands.
-        unit: N, mm, MPa or N/mm.
-
-    Raises:
-        InputError: it is no number, or its unit measures something else.
-    """
+    """Read a number in this unit, N, mm, MPa or N/mm, or with its own: 0.07 kN."""
     from hdcal.data.units import UnitError, to_code
 
     kind, example = _KINDS[unit]
@@ -109,58 +95,43 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     except UnitError as error:
         raise _refused(option, str(error), remedy) from None
     if code != unit:
-        words = f"'{text}' is not {kind}: its unit is that of {code}"
-        raise _refused(option, words, remedy)
+        problem = f"'{text}' is not {kind}: its unit is that of {code}"
+        raise _refused(option, problem, remedy)
     return InUnit(number * factor)
 
 
 def read_ends(text: str, option: str) -> tuple[float, float]:
-    """Read LO:HI.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Read LO:HI."""
     try:
         low, high = map(float, text.split(":"))
         if math.isfinite(low) and math.isfinite(high):
             return low, high
     except ValueError:
         pass
-    words = f"'{text}' is not LO:HI"
-    raise _refused(option, words, "Write it like 0.38:0.42")
+    raise _refused(option, f"'{text}' is not LO:HI", "Write it like 0.38:0.42")
 
 
 def read_grid(text: str, option: str) -> list[float]:
-    """Read start:stop:count or a comma list of numbers.
-
-    Raises:
-        InputError: it is neither, or too long.
-    """
+    """Read START:STOP:COUNT or a list of numbers with commas."""
     try:
         numbers = _range(text) if ":" in text else [float(x) for x in text.split(",")]
     except ValueError:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
-        words = f"'{text}' is neither start:stop:count nor a list of numbers"
+        problem = f"'{text}' is neither start:stop:count nor a list of numbers"
         most = f"with at most {RANGES['points'].high} points"
         remedy = f"Write it like 0:0.6:61 or 0.1,0.2, {most}"
-        raise _refused(option, words, remedy)
+        raise _refused(option, problem, remedy)
     return numbers
 
 
 def read_deformations(text: str, option: str) -> list[float]:
-    """Read a grid of deformations, where 0,4 may as well be 0.4.
-
-    A list that begins with 1, such as 1,5, is taken for one.
-
-    Raises:
-        InputError: it may be a decimal comma, or is no grid.
-    """
+    """Read a grid; refuse 0,4, which may have a decimal comma or be a list."""
     if _DECIMAL_COMMA.fullmatch(text):
         first, second = text.strip().split(",")
-        words = f"'{text}' is a list of two numbers, or one with a decimal comma"
+        problem = f"'{text}' is a list of two numbers, or one with a decimal comma"
         remedy = f"Write {first}.{second} for one, {first}:{float(second):g}:2 for two"
-        raise _refused(option, words, remedy)
+        raise _refused(option, problem, remedy)
     return read_grid(text, option)
 
 
@@ -179,22 +150,13 @@ def _between(start: float, stop: float, count: int) -> list[float]:
 
 
 def read_window(text: str, option: str, *, count: int = 2) -> list[float]:
-    """Read from:to, from:to:count or a comma list of numbers.
-
-    Args:
-        text: as the user wrote it.
-        option: where it stands.
-        count: of the numbers over which from:to is spread, both ends included.
-
-    Raises:
-        InputError: it is none of them, or an empty window.
-    """
+    """Read a grid, or FROM:TO as that many numbers, both ends included."""
     if text.count(":") != 1:
         return read_grid(text, option)
     low, high = read_ends(text, option)
     if high < low:
-        words = f"'{text}' is an empty window"
-        raise _refused(option, words, "Give the lower end first")
+        problem = f"'{text}' is an empty window"
+        raise _refused(option, problem, "Give the lower end first")
     return _between(low, high, count if high > low else 1)
 
 
@@ -207,30 +169,27 @@ def read_named(
     fault: str = "is not NAME=…",
     example: str = "wall_thickness_mm=0.6:0.76:5",
 ) -> dict[str, T]:
-    """Read every NAME=…, whatever stands behind the sign.
+    """Read NAME=VALUE texts.
 
     Args:
         texts: as the user wrote them.
-        option: where they stand.
-        read: reads what follows the name.
-        known: returns the names that there are; by default any will do.
-        fault: what is said of a text of another form.
-        example: what is shown instead.
-
-    Raises:
-        InputError: holds what is wrong with any of them.
+        option: its name.
+        read: reads a value.
+        known: returns the allowed names; by default every name is.
+        fault: of a text of another form.
+        example: of the right form.
     """
     found: dict[str, T] = {}
     with Findings() as wrong:
         for text in texts:
             name, sign, rest = (part.strip() for part in text.partition("="))
             if not (name and sign and rest):
-                words = f"'{text}' {fault}"
-                wrong.append(Finding(option, words, f"Write it like {example}"))
+                remedy = f"Write it like {example}"
+                wrong.append(Finding(option, f"'{text}' {fault}", remedy))
                 continue
             if name in found:
-                words = f"'{name}' is given twice"
-                wrong.append(Finding(option, words, "Keep one of them"))
+                problem = f"'{name}' is given twice"
+                wrong.append(Finding(option, problem, "Keep one of them"))
             if known is not None and name not in known():
                 wrong.append(_unknown(name, known(), option))
             try:
@@ -247,11 +206,7 @@ def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
 
 
 def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:
-    """Read every QUANTITY=HEADER.
-
-    Raises:
-        InputError: one of them has no such form, or a quantity comes twice.
-    """
+    """Read QUANTITY=HEADER texts."""
     return read_named(
         texts,
         option,
@@ -262,14 +217,14 @@ def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, st
 
 
 def read_list(texts: Sequence[str], option: str) -> list[str]:
-    """Read names that are repeated or listed with commas."""
+    """Read names that are repeated or separated by commas."""
     return [name.strip() for text in texts for name in text.split(",") if name.strip()]
 
 
 ENDS = Parsed("LO:HI", read_ends)
 DEFORMATIONS = Parsed("START:STOP:COUNT", read_deformations)
 NUMBERS = Parsed("LIST", read_grid)
-# Temperatures of which the worst counts: a window is spread over eleven.
+# Temperatures of which the worst counts: a window becomes eleven of them.
 WINDOW = Parsed("FROM:TO", partial(read_window, count=11))
 FORCE = Parsed("N", partial(read_quantity, unit="N"))
 LENGTH = Parsed("MM", partial(read_quantity, unit="mm"))

@@ -21,12 +21,11 @@ from hdcal.errors import Finding
 if TYPE_CHECKING:
     from hdcal.data.case import Case
 
-# Adds one or several options to a command.
 Decorator = Callable[[Callable], Callable]
 
 
 def combined(*options: Decorator) -> Decorator:
-    """Return one decorator for several options, shown in this order in the help."""
+    """Return one decorator for several options, in the order of the help."""
 
     def add(command: Callable) -> Callable:
         for option in reversed(options):
@@ -39,14 +38,7 @@ def combined(*options: Decorator) -> Decorator:
 def repeated_option(
     *names: str, metavar: str, read: Callable[[Sequence[str], str], Any], help: str
 ) -> Decorator:
-    """Return an option that may be repeated.
-
-    Args:
-        names: of the option and of its parameter.
-        metavar: form of its text.
-        read: called with all texts and the option's name; raises `InputError`.
-        help: its meaning.
-    """
+    """Return an option that may be repeated; `read` takes all texts and its name."""
     return click.option(
         *names, metavar=metavar, multiple=True, callback=read_all(read), help=help
     )
@@ -62,38 +54,39 @@ column_option = repeated_option(
     "columns",
     metavar="QUANTITY=HEADER",
     read=read_columns,
-    help="Read a quantity from a header of your own: force=Load[kgf].",
+    help="Read a quantity from a column: force=Load[kgf]. May be repeated.",
 )
 # How cases are read.
 reading_options = combined(
     click.option(
         "--gear",
         metavar="GEAR.toml",
-        help="The gear file [default: gear.toml beside the data].",
+        help="Read the gear from this file [default: gear.toml beside the data].",
     ),
     click.option(
         "--encoding",
         metavar="NAME",
-        help="Of the data file's text [default: what it looks like].",
+        help="Decode the data file with this encoding [default: detected].",
     ),
     click.option(
         "--specimen",
         metavar="LABEL",
-        help="Of several in the data, the one whose rows are read.",
+        help="Read the rows of this specimen only.",
     ),
     sheet_option,
     column_option,
     click.option(
         "--range",
         metavar="LOW:HIGH",
-        help="Working range: 0.1:0.6 of the deformation [mm], 10%:40% of the largest "
-        "force, straight for the longest straight part, or all until the force drops "
-        "for good [default: all; of calibrate straight, for a curve that is no line].",
+        help="Use the readings in this range: 0.1:0.6 of the deformation [mm], "
+        "10%:40% of the largest force, straight for the longest straight part, or all "
+        "until the force drops for good [default: all; calibrate takes straight where "
+        "the curve is not a line].",
     ),
     click.option(
         "--theory",
         type=click.Choice(get_args(Theory)),
-        help="Stiffness formula that K multiplies; overrides the gear file.",
+        help="Use this stiffness formula; overrides the gear file.",
     ),
 )
 # Which case is read, and how.
@@ -107,7 +100,7 @@ def take_reading(settings: dict) -> dict:
 
 
 def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
-    """Read the case that `case_options` named; the console collects what is wrong."""
+    """Read the case of `case_options`; the console collects findings."""
     from hdcal.data.reading import read_case
 
     if columns is None:  # The console has that finding already.
@@ -118,20 +111,20 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
 library_option = click.option(
     "--library",
     metavar="minus:NAME[,NAME]",
-    help="Leave effects out of the library [default: all of them].",
+    help="Leave effects out of the library [default: all effects].",
 )
 skip_bad_option = click.option(
     "--skip-bad",
     is_flag=True,
-    help="Leave out gears of which something is wrong, whole, and say so.",
+    help="Leave out gears with bad input, and list them.",
 )
-# The console knows it already; click has to accept it.
+# Read by the program before the command; declared so that click accepts it.
 json_option = click.option(
     "--json",
     "_json",
     is_flag=True,
     expose_value=False,
-    help="Print one JSON object; words go to standard error.",
+    help="Print one JSON object; messages go to standard error.",
 )
 force_option = click.option(
     "--force", is_flag=True, help="Replace an older result of hdcal."
@@ -139,25 +132,16 @@ force_option = click.option(
 
 
 def folder_options(help: str) -> Decorator:
-    """Return --out and --force.
-
-    Args:
-        help: which folder --out names, and which one it is by default.
-    """
+    """Return --out, with this help, and --force."""
     return combined(click.option("--out", metavar="DIR", help=help), force_option)
 
 
 # For a command that writes a folder only if asked.
-out_option = folder_options("Also write a folder with a report.")
+out_option = folder_options("Write a result folder with a report to DIR.")
 
 
 def direction_option(help: str, default: str | None = "up") -> Decorator:
-    """Return --direction.
-
-    Args:
-        help: what up and down are.
-        default: without it.
-    """
+    """Return --direction, with this help and default."""
     ways = click.Choice(["up", "down"])
     return click.option(
         "--direction", type=ways, default=default, show_default=True, help=help
@@ -170,13 +154,13 @@ start_options = combined(
     click.option(
         "--gear",
         metavar="GEAR.toml",
-        help="Without RUN: a gear of which priors are known.",
+        help="Use the priors of this gear instead of RUN.",
     ),
 )
 
 
 def material_option(help: str) -> Decorator:
-    """Return --material."""
+    """Return --material, with this help."""
     return repeated_option(
         "--material", "materials", metavar="NAME", read=read_list, help=help
     )
@@ -187,41 +171,36 @@ tolerance_option = repeated_option(
     "tolerances",
     metavar="SIZE_mm=±",
     read=partial(read_named, read=partial(read_quantity, unit="mm")),
-    help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
+    help="Let a size vary by its tolerance: wall_thickness_mm=0.02. May be repeated.",
 )
 seed_option = click.option(
     "--seed",
     default=0,
     show_default=True,
-    help="The same seed gives the same result.",
+    help="Set the seed of all random numbers.",
 )
 sampling_options = combined(
-    click.option("--chains", default=4, show_default=True, help="Independent chains."),
+    click.option("--chains", default=4, show_default=True, help="Run so many chains."),
     click.option(
         "--warmup",
         default=1000,
         show_default=True,
-        help="Iterations of adaptation per chain.",
+        help="Adapt each chain for so many iterations.",
     ),
     click.option(
-        "--draws", default=1000, show_default=True, help="Draws kept per chain."
+        "--draws", default=1000, show_default=True, help="Keep so many draws per chain."
     ),
     seed_option,
 )
 
 
 def is_given(name: str) -> bool:
-    """Return whether a parameter was given on the command line, readable or not."""
+    """Return whether a parameter is on the command line, readable or not."""
     source = click.get_current_context().get_parameter_source(name)
     return source is ParameterSource.COMMANDLINE
 
 
 def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:
-    """Return a finding for each parameter that was given in spite of an option.
-
-    Args:
-        names: of parameters that do not go with it.
-        mode: the option.
-    """
-    words = f"has no meaning with {mode}"
-    return [Finding(name, words, "leave it out") for name in names if is_given(name)]
+    """Return a finding for each of these parameters that was given with a mode."""
+    problem = f"has no meaning with {mode}"
+    return [Finding(name, problem, "Leave it out") for name in names if is_given(name)]

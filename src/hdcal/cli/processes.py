@@ -22,20 +22,20 @@ def run_all(
     """Return the result of `work` for every task, in their order.
 
     Args:
-        work: can be imported by name where there are several jobs.
+        work: can be imported by name if there are several jobs.
         tasks: its arguments.
-        jobs: processes; one is this process, so that compiled code is used again.
-        progress: called with the numbers of tasks done and of all tasks.
+        jobs: number of processes; one is this process, which keeps compiled code.
+        progress: called with the numbers of done and of all tasks.
     """
+    report = progress or (lambda done, total: None)
     if min(jobs, len(tasks)) == 1:
         results = []
         for task in tasks:
             results.append(work(*task))
-            if progress is not None:
-                progress(len(results), len(tasks))
+            report(len(results), len(tasks))
         return results
     others = {*multiprocessing.active_children()}
-    # A fork of a process in which JAX has begun hangs.
+    # A fork of a process in which JAX has started hangs.
     spawn = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
         min(jobs, len(tasks)), mp_context=spawn, initializer=_begin
@@ -44,12 +44,11 @@ def run_all(
         futures = [pool.submit(work, *task) for task in tasks]
         for done, future in enumerate(as_completed(futures), start=1):
             future.result()
-            if progress is not None:
-                progress(done, len(tasks))
+            report(done, len(tasks))
         pool.shutdown()
         return [future.result() for future in futures]
     except BaseException:
-        # Do not wait for tasks that have begun.
+        # Do not wait for running tasks.
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in {*multiprocessing.active_children()} - others:
             worker.terminate()
@@ -57,7 +56,7 @@ def run_all(
 
 
 def _begin() -> None:
-    """Prepare a worker process; its parent alone handles the keyboard."""
+    """Prepare a worker process; only its parent handles interrupts."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Console(json=False).prepare()
@@ -65,7 +64,7 @@ def _begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process once its parent is gone."""
+    """Exit when the parent, killed, cannot stop this process."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])

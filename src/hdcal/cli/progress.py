@@ -9,7 +9,7 @@ from contextlib import contextmanager
 def progress_bar(
     doing: str = "sampling",
 ) -> Iterator[Callable[[int, int], None] | None]:
-    """Yield a function of the parts done and of all parts; None without a terminal."""
+    """Yield a function of the numbers of done and of all parts; None off a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

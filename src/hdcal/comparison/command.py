@@ -9,21 +9,21 @@ from hdcal.cli.command import command
 from hdcal.cli.console import Console
 
 
-@command(short_help="Finished results side by side: how they differ, how surely.")
+@command(short_help="Compare the stiffness of finished results.")
 @click.argument("results", metavar="RUN...", nargs=-1, required=True)
 @click.option(
     "--tolerance",
     type=float,
     metavar="N/mm",
-    help="Difference of stiffness that matters, as read.",
+    help="Set the difference of stiffness, as read, that matters.",
 )
-@options.folder_options("Write a result folder with a report.")
+@options.folder_options("Write a result folder with a report to DIR.")
 @options.json_option
 @click.pass_obj
 def compare(console: Console, results, out, force, **asked):
     """Compare the stiffness of each RUN with that of the first.
 
-    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`.
+    RUN is a result folder of `hdcal calibrate` or `hdcal diagnose`.
     """
     from hdcal.comparison.compare import compare as compared
     from hdcal.inference.model_average import load_models

@@ -14,28 +14,33 @@ from hdcal.cli.options import (
 )
 
 
-@command(short_help="Where, why and how far the model is off.")
+@command(short_help="Find the gap between model and data, and its causes.")
 @reading_options
 @click.argument("cases", metavar="CASE...", nargs=-1, required=True)
 @library_option
-@click.option("--quick", is_flag=True, help="Answer without sampling: no margins.")
-@click.option("--no-report", is_flag=True, help="Leave out figures and report.")
 @click.option(
-    "--jobs", default=1, show_default=True, help="Processes to share many cases."
+    "--quick", is_flag=True, help="Skip sampling; the result then gives no margins."
+)
+@click.option("--no-report", is_flag=True, help="Write no figures and no report.")
+@click.option(
+    "--jobs",
+    default=1,
+    show_default=True,
+    help="Diagnose many cases in so many processes.",
 )
 @seed_option
 @click.option(
     "--out",
     metavar="DIR",
-    help="Result folder to make [default: NAME-diagnosis, of many cases diagnosis].",
+    help="Write the result to DIR [default: NAME-diagnosis; many cases: diagnosis].",
 )
 @force_option
 @json_option
 @click.pass_obj
 def diagnose(console: Console, cases, out, force, jobs, no_report, **settings):
-    """Find the gap between model and measurement of each CASE, and its cause.
+    """Find the gap between model and data of each CASE, and its causes.
 
-    Of one CASE the result is DIR itself, of several DIR/NAME each.
+    The result of one CASE is DIR, those of several are DIR/NAME.
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible

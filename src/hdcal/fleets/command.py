@@ -10,46 +10,46 @@ from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 
 
-@command(short_help="Many gears: which one is odd, and how much do they scatter?")
+@command(short_help="Compare many gears: scatter, outliers, the next gear.")
 @options.case_options
 @click.option(
     "--deformation",
     type=LENGTH,
-    help="Deformation as read at which gears to come are asked for their force [mm].",
+    help="Predict the force of future gears at this deformation as read [mm].",
 )
 @click.option(
-    "--limit-force", type=FORCE, help="Capacity to compare that force with [N]."
+    "--limit-force", type=FORCE, help="Compare that force with this capacity [N]."
 )
 @click.option(
     "--force-tolerance",
     type=FORCE,
-    help="Width within which the force may lie, for the gauge R&R [N].",
+    help="Set the width of the tolerance of the force for gauge R&R [N].",
 )
 @click.option(
     "--gears",
     metavar="TABLE",
-    help="Table of the sizes of each gear, if they differ.",
+    help="Read the sizes of each gear from a table, if they differ.",
 )
 @click.option(
     "--since",
     metavar="DAY",
-    help="Leave out readings before a day, as 2026-09-01.",
+    help="Leave out readings before this day: 2026-09-01.",
 )
 @options.skip_bad_option
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Dask scheduler whose workers read the files of a Parquet folder.",
+    help="Read a Parquet folder on the workers of this Dask scheduler.",
 )
 @options.seed_option
-@options.folder_options("Result folder [default: NAME-fleet].")
+@options.folder_options("Write the result to DIR [default: NAME-fleet].")
 @options.json_option
 @click.pass_obj
 def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **given):
-    """Compare the gears in DATA: their stiffness, their scatter, the odd ones.
+    """Compare the gears in DATA: stiffness, scatter, outliers.
 
-    DATA names the gear of each row in a column `specimen`, also called gear or serial;
-    or it is a folder with a file, or a folder of data.csv and gear.toml, for each gear.
+    DATA has a column `specimen`, gear or serial, or is a folder with a file, or a
+    folder of data.csv and gear.toml, for each gear.
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible

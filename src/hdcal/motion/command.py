@@ -11,30 +11,50 @@ from hdcal.cli.options import json_option, repeated_option, seed_option
 from hdcal.errors import Finding
 
 
-@command(short_help="Motion of a calibrated gear under a force over time.")
+@command(short_help="Predict the motion of a gear under a force over time.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--force",
     required=True,
     metavar="F.csv|step",
-    help="Force on the gear: a table with time_s and force_N, or a step.",
+    help="Apply this force: a table with time_s and force_N, or a step.",
 )
 @repeated_option(
     "--column",
     "columns",
     metavar="QUANTITY=HEADER",
     read=read_columns,
-    help="Header of a quantity in F.csv: force=Load[kgf].",
+    help="Read a quantity of F.csv from a column: force=Load[kgf].",
 )
-@click.option("--amplitude", type=FORCE, help="Of a step [N] [default: 80].")
 @click.option(
-    "--duration", type=float, metavar="S", help="Of a step [s] [default: 0.5]."
+    "--amplitude", type=FORCE, help="Set the amplitude of a step [N] [default: 80]."
 )
-@click.option("--temperature", type=float, help="Of the gear [°C] [default: tested].")
-@click.option("--mass-kg", "mass", type=float, help="Moved mass [default: prior].")
-@click.option("--damping", type=float, help="Damping c [N·s/mm] [default: prior].")
-@click.option("--points", default=1001, show_default=True, help="Number of times.")
-@click.option("--draws", default=500, show_default=True, help="Number of gears.")
+@click.option(
+    "--duration",
+    type=float,
+    metavar="S",
+    help="Set the duration of a step [s] [default: 0.5].",
+)
+@click.option(
+    "--temperature",
+    type=float,
+    help="Set the temperature of the gear [°C] [default: the tested one].",
+)
+@click.option(
+    "--mass-kg",
+    "mass",
+    type=float,
+    help="Set the moved mass [kg] [default: its prior].",
+)
+@click.option(
+    "--damping", type=float, help="Set the damping c [N·s/mm] [default: its prior]."
+)
+@click.option(
+    "--points", default=1001, show_default=True, help="Predict at so many times."
+)
+@click.option(
+    "--draws", default=500, show_default=True, help="Integrate so many draws."
+)
 @seed_option
 @click.option(
     "--out", metavar="DIR", help="Write the result to DIR [default: RUN-response]."
@@ -45,7 +65,7 @@ from hdcal.errors import Finding
 def respond(console: Console, run, force, columns, out, replace, **asked):
     """Predict the deformation over time of the gear of RUN, a result folder.
 
-    Units: N, mm, s, Hz, kg, N·s/mm. Motion begins at rest.
+    Units are N, mm, s, kg, N·s/mm. The motion begins at rest.
     """
     from hdcal.data.measurements.force_table import read_force
     from hdcal.inference.model_average import load_models

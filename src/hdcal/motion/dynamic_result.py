@@ -17,7 +17,7 @@ from hdcal.motion.dynamic_problem import (
     predict_motion,
 )
 from hdcal.report.charts.chart_spec import Chart
-from hdcal.report.charts.draws_charts import prior_chart, rank_chart
+from hdcal.report.charts.draws_charts import prior_chart
 from hdcal.report.item import Interval, Words, quantity
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,
@@ -56,11 +56,10 @@ class DynamicCalibration(PosteriorResult):
         return self.lines("assumptions")
 
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return the record with bands, priors and ranks."""
+        """Return the record with bands, and priors."""
         return {
             "motion": motion_chart(self.bands),
             "priors": prior_chart(self.posterior),
-            "sampler": rank_chart(self.posterior),
         }
 
 

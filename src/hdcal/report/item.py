@@ -1,4 +1,4 @@
-"""Fields of a result: items with labels and units, intervals and texts."""
+"""Items: the fields of results, with labels and units."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -9,16 +9,16 @@ from pydantic import AliasGenerator, BaseModel, ConfigDict, Field
 from hdcal.quantities import Quantities
 
 INTERVAL = 0.95
-# Shares below the lower end, the median and the upper end of an interval.
+# Probabilities below the lower end, the median and the upper end of an interval.
 TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 
 Words = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=0)]
 EffectName = Annotated[str, Field(pattern="^[_A-Za-z][_A-Za-z0-9]*$")]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-# Sums of probabilities may exceed one by a rounding error.
+# A sum of probabilities may exceed one by rounding error.
 Probability = Annotated[float, Field(ge=0.0, le=1.000001)]
-# What charts need and JSON does not hold.
+# For charts; not in the JSON.
 Draws = Annotated[np.ndarray, Field(exclude=True)]
 
 
@@ -28,10 +28,10 @@ def quantity(
     """Declare a field.
 
     Args:
-        label: shown on axes and in tables.
-        unit: of the number; empty for a dimensionless one.
-        column: name in tables; by default the name of the field.
-        limits: further constraints, as of pydantic's `Field`.
+        label: on axes and in tables.
+        unit: empty for a dimensionless number.
+        column: name in tables; by default that of the field.
+        limits: constraints, as of pydantic's `Field`.
     """
     extra = {"unit": unit, "column": column}
     given = {name: text for name, text in extra.items() if text}
@@ -58,7 +58,7 @@ class Item(BaseModel):
 
     @classmethod
     def label(cls, name: str) -> str:
-        """Return label and unit of a field, as an axis shows them."""
+        """Return label and unit of a field, for an axis."""
         title, unit = cls.model_fields[name].title or name, cls._extra(name, "unit")
         return f"{title} [{unit}]" if unit else title
 
@@ -68,10 +68,10 @@ class Item(BaseModel):
         return str(extra.get(key, "")) if isinstance(extra, Mapping) else ""
 
     def columns(self) -> dict[str, Any]:
-        """Return numbers and texts keyed by column name.
+        """Return numbers and texts by column.
 
-        The ends of an interval stand beside its median as `_lo` and `_hi`: those of
-        `stiffness_N_per_mm` are `stiffness_lo` and `stiffness_hi`.
+        An interval `stiffness_N_per_mm` has the columns `stiffness_N_per_mm` of its
+        median, `stiffness_lo` and `stiffness_hi`.
         """
         found: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
@@ -113,13 +113,7 @@ class Interval(Item):
 
 
 def with_units(value: Any, plain: Any, units: Quantities) -> Any:
-    """Return the JSON form of a value with its fields named after what was measured.
-
-    Args:
-        value: an item, or several of them.
-        plain: its JSON form.
-        units: names and units of what was measured.
-    """
+    """Return the JSON form `plain` of items with keys in the measured units."""
     if isinstance(value, Item):
         names = {_json_name(name): name for name in type(value).model_fields}
         held = {key: getattr(value, str(names.get(key, key))) for key in plain}

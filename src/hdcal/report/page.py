@@ -1,4 +1,4 @@
-"""A result as one HTML page that needs no other file, and as a notebook's cell."""
+"""A result as an HTML page that needs no other file, and in a notebook."""
 
 import base64
 from collections.abc import Mapping
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 _IMAGE = Markup('<img src="data:image/svg+xml;base64,{}" alt="{}">')
 _FIGURE = Markup("<figure{}>{}<figcaption>{}</figcaption></figure>")
 _INTERACTIVE = Markup(
-    '<script type="application/json">{}</script><p class="hint soft">Drag to zoom, or '
-    "turn the wheel; drag with shift to move; double-click to see all.</p>"
+    '<script type="application/json">{}</script><p class="hint soft">Drag to zoom, '
+    "double-click to see all.</p>"
 )
 
 
@@ -33,18 +33,15 @@ def html_page(
     Args:
         result: what to show.
         command: the command line that made it.
-        images: SVG of each chart; by default they are drawn.
+        images: SVG by chart; by default they are drawn.
     """
     charts = result.charts()
     drawn = _drawn(charts) if images is None else images
 
     def figure(name: str, shows: str, caption: str) -> str:
-        # As an image the drawing runs no script and shares no names with the page.
+        # SVG in an image runs no script and shares no names with the page.
         image = _IMAGE.format(base64.b64encode(drawn[name]).decode("ascii"), shows)
-        bars = all(panel.horizontal for panel in charts[name].panels)
-        if charts[name].failed or bars:
-            # The image carries the mark, and names beside bars: an interactive chart
-            # would not.
+        if not charts[name].interactive:
             return _FIGURE.format("", image, caption)
         image += _INTERACTIVE.format(Markup(chart_json(charts[name])))
         return _FIGURE.format(Markup(" data-touch"), image, caption)
@@ -55,8 +52,6 @@ def html_page(
     if "data-touch" in body + more:
         style += _part("uplot.css")
         script += _part("uplot.js") + _part("touch.js")
-    if "data-page" in body + more:
-        script += _part("turn.js")
     names = ("title", "subtitle", "headline", "next_step")
     page = _environment().get_template("result.html.j2")
     return page.render(
@@ -77,7 +72,7 @@ def sheet_page(result: "Result", block: str, signed: Mapping[str, str]) -> str:
     Args:
         result: of the template.
         block: name of the block.
-        signed: what stands above the line of signature, by its name.
+        signed: texts above the lines of signature, by the names below them.
     """
     style = _part("style.css")
     page = _environment().get_template("sheet.html.j2")
@@ -91,7 +86,7 @@ def sheet_page(result: "Result", block: str, signed: Mapping[str, str]) -> str:
 
 
 def notebook_html(result: "Result") -> str:
-    """Return what a notebook's cell shows of a result."""
+    """Return a result as a notebook shows it."""
     shown = _inline(result, "headline")
     if result.reasons:
         failed = Markup("FAILED — do not use this result. {}")
@@ -111,7 +106,7 @@ def _drawn(charts: Mapping[str, Chart]) -> dict[str, bytes]:
 
 
 def _inline(result: "Result", block: str) -> Markup:
-    """Return a block that is one paragraph as HTML, without the frame of it."""
+    """Return a block of one paragraph as HTML without the paragraph's tags."""
     tokens = parsed(result.block(block).strip())
     return Markup(html([token for token in tokens if token.type == "inline"]))
 
@@ -121,7 +116,7 @@ def _part(name: str) -> str:
 
 
 def _policy(style: str, script: str) -> str:
-    """Return what the page may load: its own style, script and pictures."""
+    """Return a content security policy: only this style, this script and images."""
     allowed = f"style-src {_hash(style)}; img-src data:"
     if script:
         allowed += f"; script-src {_hash(script)}"

@@ -10,7 +10,7 @@ from hdcal.inference.diagnostics import Convergence, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
 from hdcal.report.item import Interval, Words
-from hdcal.report.units import UNITS
+from hdcal.report.words import UNITS
 
 
 class Quantity(Interval):

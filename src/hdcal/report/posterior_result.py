@@ -1,4 +1,4 @@
-"""The part of a result that follows from its posterior."""
+"""Fields of a result that follow from its posterior."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -18,12 +18,12 @@ from hdcal.report.result import Result
 from hdcal.report.words import capital, label, prior_words
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
-# What a schema says of the names of parameters.
+# Constraint of the schema on names of parameters.
 PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
 
 
 class SamplerSettings(Item):
-    """How the draws were sampled."""
+    """Settings and outcome of the sampler."""
 
     chains: Annotated[int, Field(ge=2)]
     warmup: Annotated[int, Field(ge=1)]
@@ -42,7 +42,7 @@ class CalibratedGear(Item):
 
 
 class CalibratedData(Item):
-    """The data; notes are from reading them."""
+    """The data, with the notes from reading them."""
 
     name: str
     rows: Annotated[int, Field(ge=1)]
@@ -55,18 +55,11 @@ class PosteriorResult(Result):
 
     Attributes:
         warnings: sentences.
-        parameters: by name, those that were fixed last.
+        parameters: by name, fixed ones last.
         stiffness_N_per_mm: at the reference temperature, per mm as read.
-        flat_directions: in sentences, what the data do not determine.
-        interval: probability that every interval holds.
-        interval_kind: kind of the intervals.
-        checks: all of them.
-        sampling: how the draws were sampled.
-        seed: of the draws.
-        versions: of the packages that made them.
-        gear: that was calibrated.
-        data: that it was calibrated with.
-        posterior: the draws.
+        flat_directions: sentences about what the data do not determine.
+        interval: probability of every interval.
+        versions: of the packages that made the draws.
     """
 
     table = "quantities"
@@ -89,7 +82,7 @@ class PosteriorResult(Result):
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """The intervals of the result, such as the stiffness, and the parameters."""
+        """The intervals of the result, such as the stiffness, then the parameters."""
         derived = {}
         for name in type(self).model_fields:
             if isinstance(one := getattr(self, name), Interval):
@@ -117,8 +110,8 @@ class PosteriorResult(Result):
 
     @property
     def provenance(self) -> list[tuple[str, str]]:
-        """How the result was made, as pairs of name and text."""
-        return provenance_rows(self.posterior, "")
+        """Model and sampling, as pairs of name and text."""
+        return provenance_rows(self.posterior)
 
     @property
     def priors(self) -> list[tuple[str, str, str]]:

@@ -1,4 +1,4 @@
-"""How a result was made: priors, sampling, versions, command."""
+"""Provenance of a result: data, gear, model, sampling, versions."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,10 +12,10 @@ from hdcal.inference.posterior import Posterior
 from hdcal.report.words import number, with_unit
 
 
-def provenance_rows(posterior: Posterior, command: str) -> list[tuple[str, str]]:
-    """Return how a calibration was made, as pairs of name and words."""
+def provenance_rows(posterior: Posterior) -> list[tuple[str, str]]:
+    """Return pairs of name and text about the model of a posterior."""
     settings: Mapping[str, Any] = posterior.settings
-    rows = [
+    return [
         *gear_rows(posterior.case, posterior.theory),
         ("effects", ", ".join(effect.name for effect in posterior.effects) or "none"),
         (
@@ -26,11 +26,10 @@ def provenance_rows(posterior: Posterior, command: str) -> list[tuple[str, str]]
         ("seconds", f"{settings['seconds']:.1f}"),
         ("versions", ", ".join(f"{k} {v}" for k, v in settings["versions"].items())),
     ]
-    return rows + ([("command", command)] if command else [])
 
 
 def data_rows(case: Case) -> list[tuple[str, str]]:
-    """Return what was measured, as pairs of name and words."""
+    """Return pairs of name and text about the measurements."""
     records, gear, units = case.records, case.gear, case.units
 
     def ends(values, shown: str) -> str:
@@ -60,7 +59,7 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
 
 
 def gear_rows(case: Case, theory: str) -> list[tuple[str, str]]:
-    """Return which gear it was and how it was modelled, as pairs of name and words."""
+    """Return pairs of name and text about the gear and its theory."""
     gear = case.gear
     size = gear.geometry
     sizes = [

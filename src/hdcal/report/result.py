@@ -1,7 +1,7 @@
 """Results that describe themselves: JSON, schema, table, chart and text follow.
 
-A question declares its result as a subclass of `Result`. Labels and units stand in the
-fields, sentences in the template of the question.
+A question declares its result as a subclass of `Result`: labels and units are in the
+fields, sentences in the template.
 """
 
 import json
@@ -10,11 +10,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, InstanceOf, computed_field
+from pydantic.json_schema import GenerateJsonSchema
 
 from hdcal.quantities import FORCE, Quantities
 from hdcal.report.charts.chart_spec import RED, Chart
 from hdcal.report.item import Item, Words, with_units
-from hdcal.report.result_schema import DIALECT, ResultSchema, schema_with_units
 from hdcal.report.sentences import rendered
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _FIRST = ("schema", "status", "reasons", "headline", "next_step")
+_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # A failed result has reasons, any other result has none.
 _RULE = {
     "if": {"properties": {"status": {"const": "failed"}}},
@@ -34,14 +35,14 @@ _RULE = {
 class Result(Item):
     """The answer to a question.
 
-    A subclass declares the field `format`, which holds name and version of its JSON
-    format as a `Literal` with a default, and which JSON calls `schema`.
+    A subclass declares the field `format`, called `schema` in the JSON: a `Literal`
+    with name and version of the format as its default.
 
     Attributes:
-        template: address of the Markdown template inside the package.
-        table: name of the attribute that holds the main table: items, or items by name.
+        template: path of the Markdown template inside the package.
+        table: name of the attribute with the main table: items, or items by name.
         reasons: why the result must not be used; empty if it may be.
-        part: the word for what was measured.
+        part: word for what was measured.
         units: names and units of what was measured.
     """
 
@@ -88,7 +89,7 @@ class Result(Item):
             name: of the block.
             command: the command line that made the result.
             plain: without the escapes of Markdown.
-            on_page: whether it is for the page, which folds sections away.
+            on_page: whether it is for the HTML page.
         """
         values = {
             "result": self,
@@ -104,7 +105,7 @@ class Result(Item):
         return " ".join(self.block(name, plain=True).split())
 
     def lines(self, name: str) -> tuple[str, ...]:
-        """Return a block of the template as plain text, each line a sentence."""
+        """Return a block of the template as plain text, one sentence a line."""
         found = map(str.strip, self.block(name, plain=True).splitlines())
         return tuple(filter(None, found))
 
@@ -114,23 +115,17 @@ class Result(Item):
         return {name: found.pop(name) for name in _FIRST} | found
 
     def to_json(self) -> str:
-        """Return the text of a JSON file."""
+        """Return the result as the text of a JSON file."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
     @classmethod
     def json_schema(cls, units: Quantities = FORCE) -> dict[str, Any]:
-        """Return the JSON Schema of what `to_json` returns.
-
-        Args:
-            units: names and units of what was measured.
-        """
-        found = cls.model_json_schema(
-            mode="serialization", schema_generator=ResultSchema
-        )
-        return {"$schema": DIALECT, **schema_with_units(found, units)}
+        """Return the JSON Schema of `to_json` for these measured quantities."""
+        found = cls.model_json_schema(mode="serialization", schema_generator=_Schema)
+        return {"$schema": _DIALECT, **_schema_with_units(found, units)}
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the main table; columns without any value are left out."""
+        """Return the main table as a DataFrame, without empty columns."""
         import pandas as pd
 
         table = getattr(self, self.table)
@@ -144,13 +139,13 @@ class Result(Item):
         return pd.DataFrame(rows, columns=kept).rename(columns=self.units.key)
 
     def to_datatree(self) -> "xr.DataTree":
-        """Return the main table as xarray's DataTree, over the dimension `row`."""
+        """Return the main table as a DataTree with the dimension `row`."""
         import xarray as xr
 
         return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
 
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return the charts by the names under which the template shows them."""
+        """Return the charts by the names in the template."""
         return {}
 
     def charts(self) -> dict[str, Chart]:
@@ -163,25 +158,29 @@ class Result(Item):
         """Draw the first panel of the first chart.
 
         Args:
-            ax: where; by default new axes of pyplot.
+            ax: axes; by default new ones of pyplot.
 
         Raises:
             NotImplementedError: the result has no chart.
         """
-        from hdcal.report.charts.chart_drawing import axes_or_new, draw_panel
+        from hdcal.report.charts.chart_drawing import draw_panel
 
         for chart in self.charts().values():
-            axes = draw_panel(chart.panels[0], axes_or_new(ax))
+            if ax is None:
+                from matplotlib import pyplot
+
+                ax = pyplot.subplots(layout="constrained")[1]
+            draw_panel(chart.panels[0], ax)
             if chart.failed:
-                axes.set_title("FAILED, do not use", color=RED)
-            return axes
+                ax.set_title("FAILED, do not use", color=RED)
+            return ax
         raise NotImplementedError(f"a {type(self).__name__} has no chart")
 
     def text(self, width: int = 110) -> str:
-        """Return the result as a terminal shows it."""
-        from hdcal.report.terminal_text import plain_text
+        """Return the result as a terminal of this width shows it."""
+        from hdcal.report.terminal_text import drawn, terminal_parts
 
-        return plain_text(self, width)
+        return drawn(terminal_parts(self), width)
 
     def page(self, command: str = "") -> str:
         """Return the result as an HTML page that needs no other file.
@@ -199,7 +198,38 @@ class Result(Item):
         return notebook_html(self)
 
     def __repr__(self) -> str:
-        said = "FAILED, do not use" if self.reasons else self.headline
-        return f"<{type(self).__name__}: {said}>"
+        text = "FAILED, do not use" if self.reasons else self.headline
+        return f"<{type(self).__name__}: {text}>"
 
     __str__ = __repr__
+
+
+def _schema_with_units(schema: Any, units: Quantities) -> Any:
+    """Return a schema with keys in the measured units."""
+    if isinstance(schema, list):
+        return [_schema_with_units(item, units) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    found = {key: _schema_with_units(item, units) for key, item in schema.items()}
+    if isinstance(found.get("properties"), dict):
+        found["properties"] = {
+            units.key(name): item for name, item in found["properties"].items()
+        }
+        found["required"] = [*map(units.key, found.get("required", ()))]
+    if isinstance(found.get("unit"), str):
+        found["unit"] = units.unit(found["unit"])
+    return found
+
+
+class _Schema(GenerateJsonSchema):
+    """JSON Schema that allows more keys, and null for floats that may be NaN."""
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().model_schema(schema)
+        found.pop("additionalProperties", None)
+        return found
+
+    def float_schema(self, schema: Any) -> dict[str, Any]:
+        found = super().float_schema(schema)
+        finite = schema.get("allow_inf_nan") is False
+        return found if finite else {"anyOf": [found, {"type": "null"}]}

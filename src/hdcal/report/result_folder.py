@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from hdcal.report.saving import Target
 
-PAGE = "report.html"
-
 
 def write_result(
     result: Result,
@@ -33,19 +31,16 @@ def write_result(
         target: where.
         command: the command line that made the result.
         answer: name of the JSON file.
-        figures: names of the charts that become files too; by default all of them.
+        figures: names of the charts that are written as files too; by default all.
         tables: by the names of their CSV files.
-        others: content of other files by their names.
+        others: content of other files by name.
     """
-    contents = {
-        answer: result.to_json().encode(),
-        **page_files(result, command, figures),
-    }
-    contents |= {
-        name: columns_csv(dict(table)).encode()
-        for name, table in (tables or {}).items()
-    }
-    contents |= {name: make() for name, make in (others or {}).items()}
+    contents = {answer: result.to_json().encode()}
+    contents |= page_files(result, command, figures)
+    for name, table in (tables or {}).items():
+        contents[name] = columns_csv(dict(table)).encode()
+    for name, make in (others or {}).items():
+        contents[name] = make()
     with target.filled() as folder:
         for name, content in contents.items():
             (folder / name).write_bytes(content)
@@ -54,13 +49,7 @@ def write_result(
 def page_files(
     result: Result, command: str = "", figures: Collection[str] | None = None
 ) -> dict[str, bytes]:
-    """Return the page of a result and its charts by the names of their files.
-
-    Args:
-        result: what to show.
-        command: the command line that made the result.
-        figures: names of the charts that become files too; by default all of them.
-    """
+    """Return report.html and the images of charts by file name; as `write_result`."""
     charts = result.charts()
     kept = charts if figures is None else figures
     drawn = {
@@ -68,7 +57,7 @@ def page_files(
         for name, chart in charts.items()
     }
     page = html_page(result, command, {n: each["svg"] for n, each in drawn.items()})
-    files = {PAGE: page.encode("utf-8", "xmlcharrefreplace")}
+    files = {"report.html": page.encode("utf-8", "xmlcharrefreplace")}
     for name in kept:
         files |= {f"{name}.{kind}": image for kind, image in drawn[name].items()}
     return files

@@ -1,4 +1,4 @@
-"""Results on disk: built in a temporary folder beside the target, then renamed."""
+"""Results on disk: written to a temporary folder beside the target, then renamed."""
 
 import hashlib
 import json
@@ -15,7 +15,6 @@ from typing import Self
 from filelock import FileLock, Timeout
 
 from hdcal.errors import Finding, InputError, NotWritable
-from hdcal.report.plain import as_json
 
 MARKER = "hdcal-result.json"
 
@@ -45,7 +44,6 @@ class Target:
         self._new = self._temporary / "new" / self.path.name
         self._old = self._temporary / "old" / self.path.name
         self._lock = FileLock(self._temporary / "lock", timeout=0)
-        self._complete = False
         try:
             if not self.path.parent.is_dir():
                 raise self._refusal("its parent folder does not exist")
@@ -57,7 +55,7 @@ class Target:
             self._new.parent.mkdir()
             self._old.parent.mkdir()
         except BaseException as error:
-            self.__exit__(None, error, None)
+            self.__exit__()
             if isinstance(error, Timeout):
                 raise self._refusal("is being written by another process") from None
             if isinstance(error, OSError):
@@ -67,10 +65,7 @@ class Target:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind, error: BaseException | None, trace) -> None:
-        renamed = self._complete and not self._new.exists()
-        if isinstance(error, KeyboardInterrupt) and renamed:
-            error.add_note(f"{self.name} is written")
+    def __exit__(self, *_) -> None:
         with suppress(OSError):
             if self._lock.is_locked:
                 self._clean()
@@ -93,7 +88,7 @@ class Target:
             yield self._new
             if self.beginning is None:
                 marker = {"version": version("hdcal"), "files": _contents(self._new)}
-                (self._new / MARKER).write_text(as_json(marker), "utf-8")
+                (self._new / MARKER).write_text(json.dumps(marker, indent=2), "utf-8")
             for file in filter(Path.is_file, (self._new, *self._new.rglob("*"))):
                 with open(file, "rb") as stream:
                     os.fsync(stream.fileno())
@@ -103,7 +98,6 @@ class Target:
                 free = next(other for other in others if not os.path.lexists(other))
                 self._new.rename(free)
                 raise self._refusal(f"{problem}; the new result is in '{free.name}'")
-            self._complete = True
             if self.path.is_dir():
                 self.path.rename(self._old)
             self._new.rename(self.path)
@@ -111,7 +105,7 @@ class Target:
             raise NotWritable(f"{self.name}: cannot be written ({error}).") from error
 
     def _problem(self) -> str | None:
-        """Why the target must not be replaced, None if it may be."""
+        """Return why the target must not be replaced, None if it may be."""
         if not os.path.lexists(self.path):
             return None
         if not self.force:
@@ -132,7 +126,7 @@ class Target:
         return InputError([Finding(self.name or ".", problem, "Choose another name")])
 
     def _clean(self) -> None:
-        """Roll back an interrupted replacement and remove temporary files."""
+        """Undo an interrupted replacement and remove temporary files."""
         if self._new.exists() and self._old.exists() and not self.path.exists():
             self._old.rename(self.path)
         for part in (self._new.parent, self._old.parent):
@@ -140,7 +134,7 @@ class Target:
 
 
 def _contents(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file by relative path; "link" or "folder" for other entries."""
+    """Return the SHA-256 of each file, or "link" or "folder", by relative path."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content = "link" if path.is_symlink() else "folder"

@@ -1,10 +1,10 @@
 """Sentences of a result, rendered from the Markdown template of its question.
 
 A template defines the blocks `title`, `subtitle`, `headline`, `next_step`, `body` and
-`page`. A terminal, a notebook and the page show all but the last one, which is shown on
-the page only: there each `##` heading begins a folded section, and each `#` heading a
-group of them. Its variables are `result`, `part` (the word for what was measured),
-`command` (the command line) and `on_page` (whether the body is for the page).
+`page`. The last one is for the HTML page only: each `##` heading begins a folded
+section, each `#` heading a group of them. Variables are `result`, `units`, `part` (what
+was measured: gear or part), `command` (the command line) and `on_page` (whether the
+body is for the page).
 """
 
 import re
@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from jinja2.runtime import Context
 from markupsafe import Markup
 
-from hdcal.report.plain import printable
+from hdcal.errors import printable
 from hdcal.report.words import capital, hypothesis, label, load, number, percent, unit
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
@@ -25,18 +25,17 @@ _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 def rendered(
     template: str, block: str, values: Mapping[str, Any], *, plain: bool = False
 ) -> str:
-    """Return one block of a template; nothing where the template has no such block.
+    """Return a block of a template; an empty text if there is none.
 
     Args:
-        template: address of the template inside the package.
+        template: its path inside the package.
         block: name of the block.
-        values: of its variables; texts among them may come from files.
-        plain: leave out the escapes of Markdown, for texts that are not rendered.
+        values: variables; their texts may come from files.
+        plain: without the escapes of Markdown.
     """
     page = _environment(plain).get_template(template)
     context = page.new_context(dict(values))
-    # Variables and macros at the top exist once the template has run, which here
-    # renders no block: another one may need a result that this one gives.
+    # The template runs without its blocks, to define its variables and macros.
     blocks, context.blocks = context.blocks, {name: [_nothing] for name in page.blocks}
     "".join(page.root_render_func(context))
     context.blocks = blocks
@@ -49,7 +48,7 @@ def _nothing(_: Context) -> Iterator[str]:
 
 @cache
 def _environment(plain: bool) -> Environment:
-    # `autoescape` makes what a template writes Markup; other texts are escaped.
+    # With `autoescape` the text of a template is Markup; other texts are escaped.
     environment = Environment(
         loader=PackageLoader("hdcal", ""),
         autoescape=True,
@@ -80,7 +79,7 @@ def _printable(value: Any) -> Any:
 
 
 def _escaped(value: Any) -> Any:
-    """Return a text so that Markdown shows each of its characters."""
+    """Return a text whose characters Markdown shows as they are."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     return Markup(_PUNCTUATION.sub(r"\\\1", printable(value)))
@@ -94,7 +93,7 @@ def code(text: str) -> Markup:
 
 
 def median(interval: Any) -> str:
-    """Return the median with the digits that the interval leaves meaningful."""
+    """Return the median with the digits that its interval supports."""
     return number(interval.median, interval.hi - interval.lo)
 
 

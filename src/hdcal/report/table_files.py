@@ -1,4 +1,4 @@
-"""Columns as the content of CSV and Parquet files."""
+"""Tables as the content of CSV and Parquet files."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,17 +10,17 @@ from hdcal.data.formula_cells import without_formula
 
 
 def columns_csv(columns: Mapping[str, Any]) -> str:
-    """Text of a CSV file, of which a spreadsheet runs no cell as a formula."""
+    """Return the text of a CSV file; no cell is a formula for a spreadsheet."""
     frame = pd.DataFrame(dict(columns)).rename(columns=without_formula).infer_objects()
     for name in frame.select_dtypes(exclude="number"):
         frame[name] = frame[name].map(_cell, na_action="ignore").astype(object)
-    # A cell with one of the characters that end a line is quoted: both are needed.
+    # So that cells with \r or \n are quoted.
     text = frame.to_csv(index=False, float_format="%.9g", lineterminator="\r\n")
     return text.replace("\r\n", "\n")
 
 
 def frame_parquet(frame: pd.DataFrame) -> bytes | None:
-    """Content of a Parquet file; None where pyarrow is not installed."""
+    """Return the content of a Parquet file; None if pyarrow is not installed."""
     try:
         return frame.to_parquet(index=False)
     except ImportError:  # pip install "hdcal[files]"

@@ -1,7 +1,7 @@
 """A result as a terminal prints it, by rich's Markdown."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from textwrap import fill
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,13 +11,13 @@ from rich.markdown import Heading, Markdown, TableElement
 from rich.table import Table
 from rich.text import Text
 
-from hdcal.report.markdown import cut, parsed, without_figures
-from hdcal.report.plain import printable
+from hdcal.errors import printable
+from hdcal.report.markdown import parsed, shortened
 
 if TYPE_CHECKING:
     from hdcal.report.result import Result
 
-# Longer words wrap, or numbers would have no room.
+# A longer word may wrap, so that the numbers have room.
 _LONGEST = 30
 
 
@@ -33,7 +33,7 @@ class _Heading(Heading):
 
 
 class _Table(TableElement):
-    """A table in which numbers and words stay whole."""
+    """A table in which numbers and words are not broken."""
 
     def __rich_console__(
         self, console: Console, options: ConsoleOptions
@@ -58,7 +58,7 @@ class _Table(TableElement):
 
 
 class _Markdown(Markdown):
-    """Markdown without figures, and with tables that stay readable in plain text."""
+    """Markdown without figures, whose tables can be read in plain text."""
 
     elements: ClassVar = Markdown.elements | {
         "heading_open": _Heading,
@@ -67,7 +67,7 @@ class _Markdown(Markdown):
 
     def __init__(self, text: str):
         super().__init__("", hyperlinks=False)
-        self.parsed = cut(without_figures(parsed(text)))
+        self.parsed = shortened(parsed(text))
 
 
 def terminal_parts(
@@ -77,7 +77,7 @@ def terminal_parts(
 
     Args:
         result: what to print.
-        folder: where the whole result was written, or None.
+        folder: where the result was written, or None.
     """
     yield Text(f"{result.line('title')}: {result.line('subtitle')}", "bold")
     if result.reasons:
@@ -91,9 +91,17 @@ def terminal_parts(
         yield Text(f"\nThe result: {printable(folder)}  (open report.html)")
 
 
-def plain_text(result: "Result", width: int) -> str:
-    """Return what a terminal of this width prints, without colours."""
+def drawn(
+    parts: Iterable[RenderableType], width: int | None, *, colours: bool = False
+) -> str:
+    """Return the text of parts, as wide as given or as the terminal."""
     target = io.StringIO()
-    console = Console(file=target, width=width, highlight=False, emoji=False)
-    console.print(*terminal_parts(result), sep="\n")
+    console = Console(
+        file=target,
+        force_terminal=colours or None,
+        width=width,
+        highlight=False,
+        emoji=False,
+    )
+    console.print(*parts, sep="\n")
     return "\n".join(line.rstrip() for line in target.getvalue().splitlines())

@@ -15,29 +15,32 @@ from hdcal.cli.options import (
 )
 
 
-@command(short_help="Many gears: which effects they have, and how frequent each is.")
+@command(short_help="Find the effects of many gears, and their frequency.")
 @case_options
 @library_option
 @click.option(
-    "--jobs", default=1, show_default=True, help="Processes to share the gears."
+    "--jobs",
+    default=1,
+    show_default=True,
+    help="Diagnose the gears in so many processes.",
 )
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Dask scheduler whose workers share the gears instead.",
+    help="Diagnose the gears on the workers of this Dask scheduler.",
 )
 @skip_bad_option
 @seed_option
-@folder_options("Result folder [default: NAME-causes].")
+@folder_options("Write the result to DIR [default: NAME-causes].")
 @json_option
 @click.pass_obj
 def causes(
     console: Console, out, force, seed, library, jobs, scheduler, skip_bad, **given
 ):
-    """Find which effects the gears in DATA have, and how frequent each effect is.
+    """Find the effects of the gears in DATA, and the frequency of each.
 
-    DATA names the gear of each row in a column `specimen`, also called gear or serial;
-    or it is a folder with a file, or a folder, for each gear.
+    DATA has a column `specimen`, gear or serial, or is a folder with a file, or a
+    folder, for each gear.
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.measurements.gear_files import gear_files

@@ -5,28 +5,28 @@ import sys
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.console import Console, discard_output
+from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 
 
-@command(short_help="Follow readings as they come, with an alarm at a change.")
+@command(short_help="Track readings as they arrive, with an alarm at a change.")
 @click.argument("known", metavar="RUN")
 @click.option(
     "--alarm-rows",
     default=10_000.0,
     show_default=True,
     metavar="ROWS",
-    help="Mean number of readings from one false alarm to the next.",
+    help="Set the mean number of readings between false alarms.",
 )
 @json_option
 @click.pass_obj
 def track(console: Console, known, alarm_rows):
-    """Follow a gear reading by reading, from a calibration or diagnosis in RUN.
+    """Track a gear reading by reading, from RUN of `hdcal calibrate` or `diagnose`.
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
-    "force_N": 37.8}, where known with temperature_C and run (a label of the mounting);
-    or the first line is a header row such as deformation_mm,force_N, and the others are
-    CSV. Each reading is answered at once by a line on standard output.
+    "force_N": 37.8}, optionally with temperature_C and run (a label of the mounting).
+    The input may also be CSV with a header such as deformation_mm,force_N. Each reading
+    is answered at once by a line on standard output.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.tracking.stream import answer_lines

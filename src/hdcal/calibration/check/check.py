@@ -21,7 +21,7 @@ from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Count, Digest, EffectName, Item, Words, quantity
 from hdcal.report.result import Result
 from hdcal.report.sentences import rendered
-from hdcal.report.units import UNITS
+from hdcal.report.words import UNITS
 from hdcal.screening.result import HOLDING, LOADING, SEGMENTS
 
 # Prior standard deviations of log K that contain 99.7 % of it.

@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 _GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 
 
-@command(short_help="Read DATA and report what was read; compute nothing.")
+@command(short_help="Read and check DATA without computing.")
 @case_options
 @click.option(
-    "--effects", is_flag=True, help="Also list what the data lack for each effect."
+    "--effects", is_flag=True, help="List what the data lack for each effect."
 )
 @click.option(
     "--write-gear",
     metavar="GEAR.toml",
-    help="Without a gear file: write one there, with what is known from DATA.",
+    help="Write a gear file, if there is none, with what is known from DATA.",
 )
 @click.option(
     "--plot",
     metavar="FILE.png",
-    help="Draw the readings there (.png or .svg).",
+    help="Draw the readings to FILE (.png or .svg).",
 )
 @force_option
 @json_option

@@ -69,16 +69,16 @@ def _asked(command):
     return command
 
 
-@command(short_help="Ask for a gear's sizes, and write a case folder.")
+@command(short_help="Write a case folder from the sizes of a gear.")
 @click.argument("folder", metavar="FOLDER")
 @_asked
-@click.option("--data", metavar="FILE", help="Readings to copy there, as data.csv.")
+@click.option("--data", metavar="FILE", help="Copy these readings to FOLDER/data.csv.")
 @column_option
 @sheet_option
 @json_option
 @click.pass_obj
 def init(console: Console, folder, data, columns, sheet, **given):
-    """Write FOLDER with a gear file, from options or from answers to questions."""
+    """Write FOLDER with a gear file, from options or answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
     from hdcal.data.gear_file.gear_text import gear_text

@@ -14,26 +14,26 @@ from hdcal.quantities import FORCE
 _COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
 
 
-@command(short_help="Bands on the force from a result folder.")
+@command(short_help="Predict the force with its bands.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--deformation",
     type=DEFORMATIONS,
     required=True,
-    help="Deformations as read [mm]: 0:0.6:61, or a list 0.1,0.2.",
+    help="Predict at these deformations as read [mm]: 0:0.6:61 or 0.1,0.2.",
 )
 @click.option(
     "--temperature",
     type=NUMBERS,
-    help="Temperatures [°C]: 20,60 [default: the reference one].",
+    help="Predict at these temperatures [°C]: 20,60 [default: the reference].",
 )
 @direction_option(
-    "Of the movement: deformation rising or falling [default: loading].", default=None
+    "Predict for rising or falling deformation [default: loading].", default=None
 )
 @click.option(
     "--out",
     metavar="FILE.csv",
-    help="Write the table there instead of standard output.",
+    help="Write the table to FILE.csv instead of standard output.",
 )
 @force_option
 @json_option
@@ -41,8 +41,8 @@ _COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
 def predict(console: Console, run, deformation, temperature, direction, out, force):
     """Predict the force with its bands from RUN.
 
-    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
-    could not separate are averaged over by their probability.
+    RUN is a result folder of `hdcal calibrate` or `hdcal diagnose`. Hypotheses of the
+    diagnosis are averaged by their probability.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.prediction.bands.predict import predict as bands_of

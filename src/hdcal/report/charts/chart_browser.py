@@ -1,4 +1,4 @@
-"""The data of an interactive chart, for the script `touch.js` of the page."""
+"""Data of an interactive chart, for the script `touch.js` of the page."""
 
 import json
 from typing import Any
@@ -7,7 +7,6 @@ import numpy as np
 
 from hdcal.report.charts.chart_spec import (
     Band,
-    Bars,
     Chart,
     Line,
     Panel,
@@ -17,18 +16,18 @@ from hdcal.report.charts.chart_spec import (
     drawn_rows,
 )
 
-# More digits than a screen shows when it is zoomed in.
+# More digits than a zoomed chart shows.
 _DIGITS = 6
 
 
 def chart_json(chart: Chart) -> str:
-    """Return a chart as the text of a script element, in which nothing can end it."""
-    panels = [_Columns(panel).plain() for panel in chart.panels]
+    """Return a chart as the text of a script element, which cannot end the element."""
+    panels = [_Columns(panel).to_dict() for panel in chart.panels]
     return json.dumps(panels, separators=(",", ":")).replace("<", "\\u003c")
 
 
 class _Columns:
-    """Series of one panel over a common axis, as uPlot takes them."""
+    """Series of a panel over one axis, as uPlot takes them."""
 
     def __init__(self, panel: Panel):
         self._panel = panel
@@ -37,21 +36,18 @@ class _Columns:
         self._bands: list[tuple[int, int, float]] = []
         self._errors: list[tuple[int, int, int]] = []
         self._rules: list[dict[str, Any]] = []
-        self._labelled: dict[str, Any] = {}
+        self._labels: set[str] = set()
         for mark in panel.marks:
             self._add(mark)
 
-    def plain(self) -> dict[str, Any]:
-        """Return the panel as JSON holds it."""
+    def to_dict(self) -> dict[str, Any]:
         panel = self._panel
         return {
             "x": panel.x,
             "y": panel.y,
             "title": panel.title,
             "height": round(110 * panel.height) or (380 if panel.wide else 300),
-            "ticks": panel.y_ticks,
             "wide": panel.wide,
-            "names": list(panel.names),
             "limits": list(panel.y_limits),
             "log": [panel.x_log, panel.y_log],
             "bands": self._bands,
@@ -63,32 +59,21 @@ class _Columns:
 
     def _add(self, mark: Any) -> None:
         match mark:
-            case Line(steps=True):
-                self._curve(mark, *_stairs(mark.x, mark.y))
             case Line():
-                self._curve(mark, mark.x, mark.y)
+                dashed = mark.dash != "solid"
+                self._append(mark, mark.x, mark.y, width=mark.width, dashed=dashed)
             case Points():
                 self._points(mark)
             case Band():
-                self._band(mark, mark.x, mark.low, mark.high, mark.opacity)
-            case Bars():
-                low = np.zeros(len(mark.at)) if mark.low is None else mark.low
-                ends = [_boxes(mark, values) for values in (low, mark.high)]
-                self._band(mark, ends[0][0], ends[0][1], ends[1][1], 0.7)
+                high, low = (
+                    self._append(mark, mark.x, end) for end in (mark.high, mark.low)
+                )
+                self._bands.append((high, low, mark.opacity))
             case Rule():
-                each = {"axis": mark.axis, "low": mark.at, "high": mark.at}
                 dashed = mark.dash != "solid"
-                self._rules.append(each | {"colour": mark.colour, "dashed": dashed})
-                self._name(mark, dashed=dashed)
+                self._across(mark, mark.at, mark.at, {"dashed": dashed})
             case Span():
-                each = {"axis": mark.axis, "low": mark.low, "high": mark.high}
-                look = {"colour": mark.colour, "opacity": mark.opacity}
-                self._rules.append(each | look)
-                self._name(mark)
-
-    def _curve(self, mark: Line, x: np.ndarray, y: np.ndarray) -> None:
-        dashed = mark.dash != "solid"
-        self._append(mark, x, y, width=mark.width, dashed=dashed)
+                self._across(mark, mark.low, mark.high, {"opacity": mark.opacity})
 
     def _points(self, mark: Points) -> None:
         rows = drawn_rows(mark.y)
@@ -101,16 +86,13 @@ class _Columns:
             )
             self._errors.append((place, low, high))
 
-    def _band(
-        self, mark: Band | Bars, x: Any, low: Any, high: Any, opacity: float
-    ) -> None:
-        upper = self._append(mark, x, high, edge=True)
-        self._bands.append((upper, self._append(mark, x, low, edge=True), opacity))
-
-    def _name(self, mark: Rule | Span, *, dashed: bool = False) -> None:
-        """Add a series without points, so that the legend shows the label."""
+    def _across(self, mark: Rule | Span, low: float, high: float, look: dict) -> None:
+        """Add a rule or span, and an empty series for its label in the legend."""
+        ends = {"axis": mark.axis, "low": low, "high": high, "colour": mark.colour}
+        self._rules.append(ends | look)
         if mark.label:
             none = np.empty(0)
+            dashed = look.get("dashed", False)
             self._append(mark, none, none, points=True, dashed=dashed)
 
     def _append(
@@ -124,23 +106,23 @@ class _Columns:
         width: float = 0.0,
         dashed: bool = False,
     ) -> int:
-        """Add a series and return its place; an `edge` has no line and no legend."""
+        """Add a series and return its place; an `edge` has neither line nor symbols."""
         look = {"points": points and not edge, "width": width, "dashed": dashed}
-        # Of marks with the same label the legend shows the first one.
-        first = self._labelled.setdefault(mark.label, mark) is mark
-        label = mark.label if first else ""
+        # Marks with the same label share the entry of the first one.
+        label = "" if mark.label in self._labels else mark.label
+        self._labels.add(label)
         self._series.append({"label": label, "colour": mark.colour, **look})
         self._values.append((np.asarray(x, float), np.asarray(y, float), points))
         return len(self._series) - 1
 
     def _data(self) -> list[np.ndarray]:
-        """Return the common axis and each series over it; NaN where it has no value.
+        """Return the common axis and each series over it; NaN without a value.
 
-        Curves are interpolated at every place; points keep the rows of their own.
+        Curves are interpolated; points have rows of their own.
         """
         curves = [x for x, _, points in self._values if not points]
         shared = np.unique(np.concatenate(curves)) if curves else np.empty(0)
-        # Ends of error bars stand in the rows of their points.
+        # Ends of error bars have the rows of their points.
         sets = {id(x): x for x, _, points in self._values if points}
         starts, size = {}, len(shared)
         for key, x in sets.items():
@@ -156,20 +138,6 @@ class _Columns:
                 column = np.interp(over, x, y, left=np.nan, right=np.nan)
             columns.append(column[order])
         return columns
-
-
-def _stairs(edges: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a curve that is level between edges; all its places differ."""
-    starts = edges[:-1] + 1e-3 * np.diff(edges)
-    return np.column_stack([starts, edges[1:]]).ravel(), np.repeat(levels, 2)
-
-
-def _boxes(mark: Bars, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a curve that is level along each bar, and interrupted between them."""
-    half = mark.width / 2.0
-    x = np.column_stack([mark.at - half, mark.at + half, mark.at + 1.01 * half])
-    y = np.column_stack([values, values, np.full(len(values), np.nan)])
-    return x.ravel(), y.ravel()
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

@@ -1,16 +1,22 @@
-"""Matplotlib's drawing of a chart: axes, SVG and PNG."""
+"""Drawing of charts by Matplotlib: axes, SVG and PNG."""
 
+import io
+import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from textwrap import wrap
 from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 from matplotlib.legend_handler import HandlerTuple
 
-from hdcal.report.charts.canvas import heading, plain, render, style, watermark
+from hdcal.errors import printable
 from hdcal.report.charts.chart_spec import (
+    RED,
     Band,
     Bars,
     Chart,
@@ -26,22 +32,71 @@ from hdcal.report.charts.chart_spec import (
 Kind = Literal["svg", "png"]
 _DARK = "#222222"
 _DASHES = {"solid": "-", "dashed": (0, (4, 2)), "dotted": ":", "dashdot": "-."}
-_WIDTH = 7.6
+# Width of a figure [inch], and dots per inch of a PNG.
+_WIDTH, _DPI = 7.6, 160
 # More points than this are drawn small, and as pixels in an SVG.
 _MANY = 300
-# More names, or longer ones, leave an axis no room.
+# Most names of an axis, longest name, and most characters of level names together.
 _MOST_NAMES, _LONGEST_NAME, _LEVEL = 60, 26, 70
-# Names beside a bar are written in lines.
+# Names beside bars: characters in a line and in all.
 _LINE, _LONGEST_LINES = 40, 110
 _MOST_LEGENDS, _LONGEST_LEGEND = 12, 60
+# Fonts for characters that the default font lacks, such as Chinese.
+_FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
+_STYLE: dict[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-5, 7),
+    "axes.edgecolor": "#555555",
+    "axes.grid": True,
+    "axes.labelsize": 10,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 10,
+    # Automatic placement takes a seventh of all drawing.
+    "axes.titley": 1.0,
+    "figure.facecolor": "white",
+    "font.size": 9.5,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.8,
+    "hatch.linewidth": 0.6,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "hdcal",
+    "text.usetex": False,
+}
+
+
+def style():
+    """Return a context in which figures are drawn and rendered."""
+    return mpl.rc_context({**_STYLE, "font.family": _families()})
+
+
+@cache
+def _families() -> list[str]:
+    installed = {font.name for font in fontManager.ttflist}
+    return ["DejaVu Sans", *(name for name in _FONTS if name in installed)]
 
 
 def images(
     chart: Chart, title: str = "", kinds: Sequence[Kind] = ("svg", "png")
 ) -> dict[Kind, bytes]:
-    """Return a chart as the bytes of files, by their kinds."""
+    """Return a chart as the content of files, by kind."""
     figure = draw(chart)
     return {kind: render(figure, kind, title) for kind in kinds}
+
+
+def render(figure: Figure, kind: Kind, title: str = "") -> bytes:
+    """Return a figure as the bytes of a file, which are reproducible."""
+    target = io.BytesIO()
+    metadata: dict[str, Any] = {"Title": printable(title)} if title else {}
+    if kind == "svg":
+        metadata["Date"] = None
+    with style(), warnings.catch_warnings():
+        # Characters without a glyph are drawn as boxes.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
+    return target.getvalue()
 
 
 def draw(chart: Chart) -> Figure:
@@ -70,12 +125,12 @@ def draw(chart: Chart) -> Figure:
                     axes.tick_params(labelleft=False)
                     axes.set_ylabel("")
         if chart.share_x and chart.columns > 1:
-            # Side by side there is no room for the same label again.
+            # One label for all panels of the last row.
             for axes in figure.axes:
                 axes.set_xlabel("")
-            figure.supxlabel(plain(chart.panels[-1].x), fontsize=10)
+            figure.supxlabel(_plain(chart.panels[-1].x), fontsize=10)
         if chart.failed:
-            watermark(figure)
+            _watermark(figure)
     return figure
 
 
@@ -89,30 +144,48 @@ def _places(chart: Chart) -> tuple[list[tuple[int, int]], list[float]]:
             heights.append(0.0)
             column = 0
         places.append((len(heights) - 1, column))
-        heights[-1] = max(heights[-1], panel.height or _height(panel, chart))
+        usual = 2.6 if chart.columns == 1 else 2.1
+        if panel.wide or len(chart.panels) == 1:
+            usual = 4.4
+        if panel.horizontal:
+            usual = 1.1 + 0.3 * max(len(panel.names), 2)
+        heights[-1] = max(heights[-1], panel.height or usual)
         column = chart.columns if panel.wide else column + 1
     return places, heights
 
 
-def _height(panel: Panel, chart: Chart) -> float:
-    if panel.horizontal:
-        return 1.1 + 0.3 * max(len(panel.names), 2)
-    if panel.wide or len(chart.panels) == 1:
-        return 4.4
-    return 2.6 if chart.columns == 1 else 2.1
+def _plain(text: str, length: int = 80) -> str:
+    """Return a text as one line that matplotlib takes literally."""
+    shown = printable(text)
+    if len(shown) > length:
+        shown = shown[: length - 1] + "…"
+    # An even number of dollar signs would start a formula.
+    return shown.replace("$", r"\$")
+
+
+def _watermark(figure: Figure) -> None:
+    """Write across a figure that its result must not be used."""
+    figure.text(
+        0.5,
+        0.5,
+        "FAILED — do not use",
+        color=RED,
+        alpha=0.35,
+        fontsize=44,
+        fontweight="bold",
+        ha="center",
+        va="center",
+        zorder=100,
+    )
 
 
 def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
-    """Draw the marks of a panel.
+    """Draw a panel and return its axes.
 
     Args:
         panel: what to draw.
         axes: where.
-        named: labels that a legend beside it holds already; those of this panel are
-            added.
-
-    Returns:
-        The axes.
+        named: labels of other legends, to which those of this panel are added.
     """
     named = set() if named is None else named
     entries: dict[str, list[Any]] = {}
@@ -122,15 +195,12 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
             handles = handle if isinstance(handle, list) else [handle]
             entries.setdefault(mark.label, []).extend(handles)
     x, y = ("y", "x") if panel.horizontal else ("x", "y")
-    for axis, label, limits, log in (
-        (x, panel.x, panel.x_limits, panel.x_log),
-        (y, panel.y, panel.y_limits, panel.y_log),
-    ):
-        axes.set(**{f"{axis}label": plain(label)})
+    axes.set(**{f"{x}label": _plain(panel.x), f"{y}label": _plain(panel.y)})
+    for axis, log in ((x, panel.x_log), (y, panel.y_log)):
         if log:
             axes.set(**{f"{axis}scale": "log"})
-        if limits != (None, None):
-            axes.set(**{f"{axis}lim": limits})
+    if panel.y_limits != (None, None):
+        axes.set(**{f"{y}lim": panel.y_limits})
     if panel.names:
         _name(axes, panel)
     if not panel.y_ticks:
@@ -138,12 +208,14 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
         axes.grid(False)
         axes.spines["left"].set_visible(False)
     if panel.title:
-        heading(axes, plain(panel.title))
+        axes.set_title(_plain(panel.title), loc="left", fontweight="bold", color=_DARK)
+        # The common factor of the tick labels, to the left of the title.
+        axes.yaxis.get_offset_text().set_horizontalalignment("right")
     entries = {name: each for name, each in entries.items() if name not in named}
     named |= set(entries)
     if 0 < len(entries) <= _MOST_LEGENDS:
         handles = [tuple(each) for each in entries.values()]
-        names = [plain(name, _LONGEST_LEGEND) for name in entries]
+        names = [_plain(name, _LONGEST_LEGEND) for name in entries]
         look: dict[str, Any] = {"frameon": True, "framealpha": 0.8, "edgecolor": "none"}
         combined = {tuple: HandlerTuple(ndivide=1)}
         place: dict[str, Any] = {"loc": "best"}
@@ -153,22 +225,13 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
     return axes
 
 
-def axes_or_new(axes: Axes | None) -> Axes:
-    """Return these axes, or new ones of pyplot."""
-    if axes is None:
-        from matplotlib import pyplot
-
-        return pyplot.subplots(layout="constrained")[1]
-    return axes
-
-
 def _name(axes: Axes, panel: Panel) -> None:
-    """Write categories in place of numbers; of very many only some have room."""
+    """Label an axis with categories, of very many only with some."""
     step = -(-len(panel.names) // _MOST_NAMES)
     at = range(1, len(panel.names) + 1, step)
-    names = [plain(name, _LONGEST_NAME) for name in panel.names[::step]]
+    names = [_plain(name, _LONGEST_NAME) for name in panel.names[::step]]
     if panel.horizontal:
-        lines = [wrap(plain(name, _LONGEST_LINES), _LINE) for name in panel.names]
+        lines = [wrap(_plain(name, _LONGEST_LINES), _LINE) for name in panel.names]
         axes.set_yticks(at, ["\n".join(each) for each in lines[::step]])
         axes.set_ylim(len(panel.names) + 0.6, 0.4)
         axes.grid(False, axis="y")
@@ -187,9 +250,6 @@ def _line(axes: Axes, mark: Line, turned: bool, order: float) -> Any:
         "linewidth": mark.width,
         "zorder": order,
     }
-    if mark.steps:
-        way = "horizontal" if turned else "vertical"
-        return axes.stairs(mark.y, mark.x, baseline=None, orientation=way, **look)
     pair = (mark.y, mark.x) if turned else (mark.x, mark.y)
     return axes.plot(*pair, **look)[0]
 
@@ -224,7 +284,7 @@ def _band(axes: Axes, mark: Band, turned: bool, order: float) -> Any:
     shade = {"color": mark.colour, "linewidth": 0.0, "zorder": order}
     found = [fill(*ends, alpha=mark.opacity, **shade)]
     if mark.hatched:
-        # By itself: in an SVG the opacity of an area is that of its hatching too.
+        # Separate: in an SVG an area and its hatching have the same opacity.
         edge = {"facecolor": "none", "edgecolor": mark.colour, "linewidth": 0.0}
         found.append(fill(*ends, hatch="////", alpha=0.45, zorder=order, **edge))
     return found
@@ -233,26 +293,19 @@ def _band(axes: Axes, mark: Band, turned: bool, order: float) -> Any:
 def _bars(axes: Axes, mark: Bars, turned: bool, order: float) -> Any:
     low = np.zeros(len(mark.at)) if mark.low is None else mark.low
     look = {"color": mark.colour or _DARK, "zorder": order}
-    if mark.hatched:
-        look |= {"hatch": "////", "edgecolor": "white", "linewidth": 0.0}
     if turned:
         return axes.barh(mark.at, mark.high - low, mark.width, left=low, **look)
     return axes.bar(mark.at, mark.high - low, mark.width, bottom=low, **look)
 
 
-def _is_upright(axis: str, turned: bool) -> bool:
-    """Tell whether a value of this axis is a place from left to right."""
-    return (axis == "x") != turned
-
-
 def _rule(axes: Axes, mark: Rule, turned: bool, order: float) -> Any:
-    draw = axes.axvline if _is_upright(mark.axis, turned) else axes.axhline
+    draw = axes.axvline if (mark.axis == "x") != turned else axes.axhline
     look = {"linestyle": _DASHES[mark.dash], "linewidth": 1.1, "zorder": order}
     return draw(mark.at, color=mark.colour or _DARK, **look)
 
 
 def _span(axes: Axes, mark: Span, turned: bool, order: float) -> Any:
-    draw = axes.axvspan if _is_upright(mark.axis, turned) else axes.axhspan
+    draw = axes.axvspan if (mark.axis == "x") != turned else axes.axhspan
     look = {"color": mark.colour, "alpha": mark.opacity, "linewidth": 0.0}
     return draw(mark.low, mark.high, zorder=order, **look)
 

@@ -1,7 +1,4 @@
-"""Charts as declarations: what is shown, not how it is drawn.
-
-`chart_drawing` draws them with Matplotlib, `chart_browser` makes them interactive.
-"""
+"""Charts as declarations, drawn by `chart_drawing` and, in a page, `chart_browser`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,20 +6,20 @@ from typing import Literal
 
 import numpy as np
 
-# Okabe and Ito's colours, distinct in every kind of colour vision; INK is that of the
-# text around a chart.
+# Okabe and Ito's colours, distinct in every kind of colour vision; INK is the colour of
+# the text.
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 YELLOW, SKY, GREY, RED, INK = "#E69F00", "#56B4E9", "#8a8a8a", "#b00020", ""
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, YELLOW, SKY)
 _ASCENDING = (BLUE, SKY, GREEN, YELLOW, ORANGE, RED)
-# More points than this make large files and show no more.
+# More points than this make larger files and show nothing more.
 MOST_DRAWN = 4000
 Dash = Literal["solid", "dashed", "dotted", "dashdot"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """A curve; NaN interrupts it. `x` ascends; with `steps` it holds the edges."""
+    """A curve; NaN interrupts it. `x` ascends."""
 
     label: str = ""
     x: np.ndarray
@@ -30,12 +27,11 @@ class Line:
     colour: str = BLUE
     dash: Dash = "solid"
     width: float = 1.6
-    steps: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
-    """Points, with error bars from `low` to `high` where these are given."""
+    """Points, with error bars from `low` to `high` if given."""
 
     label: str = ""
     x: np.ndarray
@@ -61,7 +57,7 @@ class Band:
 
 @dataclass(frozen=True, kw_only=True)
 class Bars:
-    """Bars from `low` to `high` at places, often 1, 2, … of named categories."""
+    """Bars from `low` (0) to `high` at places, often 1, 2, … of named categories."""
 
     label: str = ""
     at: np.ndarray
@@ -69,7 +65,6 @@ class Bars:
     low: np.ndarray | None = None
     colour: str = BLUE
     width: float = 0.7
-    hatched: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,19 +99,18 @@ class Panel:
 
     Attributes:
         x: label of the axis with its unit.
-        y: likewise.
-        marks: what is drawn; marks with the same label share an entry of the legend.
+        y: as x.
+        marks: those with the same label share an entry of the legend.
         title: above the panel.
         names: categories at 1, 2, … of the x axis.
-        horizontal: drawn with both axes exchanged, so that long names have room.
-        x_limits: ends of the axis; None where the marks decide.
-        y_limits: likewise.
+        horizontal: whether the axes are exchanged, so that long names have room.
+        y_limits: ends of the axis; None: by the marks.
         x_log: whether the axis is logarithmic.
-        y_log: likewise.
-        y_ticks: whether the y axis has a scale; a density needs none.
-        wide: takes a whole row of the chart.
-        height: in inches; by default one that suits the marks.
-        legend_beside: whether the legend is outside, so that it covers no mark.
+        y_log: as x_log.
+        y_ticks: whether the y axis has a scale.
+        wide: whether the panel takes a whole row.
+        height: in inches; 0: by the marks.
+        legend_beside: whether the legend is outside the axes.
     """
 
     x: str
@@ -125,7 +119,6 @@ class Panel:
     title: str = ""
     names: Sequence[str] = ()
     horizontal: bool = False
-    x_limits: tuple[float | None, float | None] = (None, None)
     y_limits: tuple[float | None, float | None] = (None, None)
     x_log: bool = False
     y_log: bool = False
@@ -142,35 +135,41 @@ class Chart:
     Attributes:
         panels: from left to right and from top to bottom.
         columns: panels in a row.
-        share_x: panels that are not wide have the same x axis.
-        share_y: likewise.
-        failed: marked as a result that must not be used.
+        share_x: whether panels that are not wide have the same x axis.
+        share_y: as share_x.
+        static: whether a page shows it as an image only.
+        failed: whether it is marked as a result that must not be used.
     """
 
     panels: Sequence[Panel]
     columns: int = 1
     share_x: bool = False
     share_y: bool = False
+    static: bool = False
     failed: bool = False
+
+    @property
+    def interactive(self) -> bool:
+        """Whether a page can zoom it: without names, bars and the mark of failure."""
+        bars = any(isinstance(m, Bars) for panel in self.panels for m in panel.marks)
+        named = any(panel.names for panel in self.panels)
+        return not (self.static or self.failed or named or bars)
 
 
 def ascending_colours(count: int) -> list[str]:
-    """Return a colour for each of some ascending levels, from cold to hot."""
+    """Return a colour for each of some ascending levels, from blue to red."""
     places = np.round(np.linspace(0.0, len(_ASCENDING) - 1.0, count)).astype(int)
     return [_ASCENDING[place] for place in places]
 
 
 def beyond(tested: np.ndarray) -> np.ndarray:
-    """Return the rows of a curve that are drawn as not tested.
-
-    Those beside them are included, else a gap would open between both parts.
-    """
+    """Return the untested rows of a curve, with those next to them to leave no gap."""
     before, after = np.append(False, ~tested[:-1]), np.append(~tested[1:], False)
     return ~tested | after | before
 
 
 def drawn_rows(y: np.ndarray) -> np.ndarray:
-    """Return the rows to draw: all of them, or a random choice and the largest ones."""
+    """Return the rows to draw: all, or a random choice and the most extreme ones."""
     if len(y) <= MOST_DRAWN:
         return np.arange(len(y))
     chosen = np.random.default_rng(0).choice(len(y), MOST_DRAWN, replace=False)

@@ -1,5 +1,4 @@
-// Puts charts that one can touch in the place of images: drag to zoom, wheel too, drag
-// with shift to pan, click twice to see all again. Without this the images stay.
+// Replaces images by interactive charts: drag to zoom, double-click to see all.
 "use strict";
 function touch(figure) {
   const charts = JSON.parse(figure.querySelector("script").textContent);
@@ -7,79 +6,21 @@ function touch(figure) {
   room.className = charts.length > 2 ? "touch many" : "touch";
   const cells = charts.map(() => room.appendChild(document.createElement("div")));
   charts.forEach((chart, k) => cells[k].classList.toggle("row", chart.wide ?? !k));
-  const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name);
-  // Charts over the same axis move together.
+  const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const hue = each => each.colour || ink("--ink");
+  // Opacity as two digits after a colour.
+  const hex = share => Math.round(255 * share).toString(16).padStart(2, "0");
+  const shown = value => value == null ? "" : Number(value.toPrecision(5)).toString();
+  const isEdge = each => !each.points && each.width === 0;
+  // Charts with the same axis zoom together.
   const syncs = Object.fromEntries(
     charts.map(chart => [chart.x, uPlot.sync(Math.random().toString())]));
   let drawn = [];
 
-  function limits(plot, low, high) {
-    for (const each of drawn)
-      if (each.axes[0].label === plot.axes[0].label)
-        each.setScale("x", {min: low, max: high});
-  }
-
-  function moving(plot) {
-    const over = plot.over;
-    over.addEventListener("wheel", event => {
-      event.preventDefault();
-      const at = plot.posToVal(event.offsetX, "x"), by = event.deltaY < 0 ? 0.8 : 1.25;
-      const {min, max} = plot.scales.x;
-      limits(plot, at - (at - min) * by, at + (max - at) * by);
-    }, {passive: false});
-    over.addEventListener("mousedown", down => {
-      if (!down.shiftKey) return;
-      down.stopImmediatePropagation();
-      const {min, max} = plot.scales.x, from = down.clientX;
-      const unit = (max - min) / over.clientWidth;
-      const move = event => {
-        const shift = (from - event.clientX) * unit;
-        limits(plot, min + shift, max + shift);
-      };
-      const up = () => {
-        document.removeEventListener("mousemove", move);
-        document.removeEventListener("mouseup", up);
-      };
-      document.addEventListener("mousemove", move);
-      document.addEventListener("mouseup", up);
-    }, {capture: true});
-  }
-
-  function shown(value) {
-    return value == null ? "" : Number(value.toPrecision(5)).toString();
-  }
-
-  // What stands at a place of the axis: a number, or one of its names.
-  function placed(chart, value) {
-    if (!chart.names.length || value == null) return shown(value);
-    return chart.names[Math.round(value) - 1] ?? "";
-  }
-
-  // An axis of names: level where all of them have room, else upright and some left out.
-  function named(chart) {
-    const longest = Math.min(26, Math.max(...chart.names.map(name => name.length)));
-    const wide = 7 * longest + 12;
-    const isLevel = plot => wide * chart.names.length < plot.width - 80;
-    return {
-      size: plot => isLevel(plot) ? 44 : 40 + 6 * longest,
-      rotate: plot => isLevel(plot) ? 0 : -90,
-      space: plot => isLevel(plot) ? wide : 16,
-      incrs: [1, 2, 5].flatMap(
-        n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
-      splits: (_, axis, low, high, step) => {
-        const places = [];
-        for (let at = step * Math.ceil(low / step); at <= high; at += step)
-          places.push(at);
-        return places;
-      },
-      values: (_, places) => places.map(place => placed(chart, place).slice(0, 26)),
-    };
-  }
-
-  // What y spans, with some room but not beyond where it can be.
+  // Range of y with some margin, within its limits.
   function spanned(chart, low, high) {
-    if (isLog(chart, 1)) return uPlot.rangeLog(low, high, 10, true);
-    const rules = (chart.rules || []).filter(rule => rule.axis === "y");
+    if (chart.log[1]) return uPlot.rangeLog(low, high, 10, true);
+    const rules = chart.rules.filter(rule => rule.axis === "y");
     const [least, most] = uPlot.rangeNum(
       Math.min(low ?? 0, ...rules.map(rule => rule.low)),
       Math.max(high ?? 1, ...rules.map(rule => rule.high)), 0.1, true);
@@ -88,20 +29,23 @@ function touch(figure) {
       roof == null ? most : Math.min(most, roof)];
   }
 
-  const isLog = (chart, axis) => Boolean((chart.log || [])[axis]);
-
-  // Lines and strips across a chart, below its curves.
-  function drawRules(plot, chart) {
+  // Draws within the axes of a plot.
+  function clipped(plot, draw) {
     const {ctx, bbox} = plot;
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    for (const rule of chart.rules || []) {
+    draw(ctx, bbox);
+    ctx.restore();
+  }
+
+  // Rules and spans, below the curves.
+  const drawRules = (plot, chart) => clipped(plot, (ctx, bbox) => {
+    for (const rule of chart.rules) {
       const [from, to] = [rule.low, rule.high].map(v => plot.valToPos(v, rule.axis, true));
-      const colour = rule.colour || ink("--ink").trim();
-      ctx.fillStyle = colour + hex(rule.opacity ?? 1);
-      ctx.strokeStyle = colour;
+      ctx.fillStyle = hue(rule) + hex(rule.opacity ?? 1);
+      ctx.strokeStyle = hue(rule);
       ctx.setLineDash(rule.dashed ? [8, 6] : []);
       ctx.beginPath();
       if (rule.opacity !== undefined) {
@@ -114,18 +58,12 @@ function touch(figure) {
         ctx.stroke();
       }
     }
-    ctx.restore();
-  }
+  });
 
-  function drawErrors(plot, chart) {
-    const {ctx, bbox} = plot;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
+  const drawErrors = (plot, chart) => clipped(plot, ctx => {
     ctx.lineWidth = 2 * devicePixelRatio;
-    for (const [at, low, high] of chart.errors || []) {
-      ctx.strokeStyle = chart.series[at].colour || ink("--ink").trim();
+    for (const [at, low, high] of chart.errors) {
+      ctx.strokeStyle = hue(chart.series[at]);
       ctx.beginPath();
       plot.data[0].forEach((x, row) => {
         const ends = [low, high].map(k => plot.data[k + 1][row]);
@@ -136,44 +74,21 @@ function touch(figure) {
       });
       ctx.stroke();
     }
-    ctx.restore();
+  });
+
+  // What the legend shows at the pointer: a value, the ends of a band or error bar.
+  function valued(chart, plot, value, k, row) {
+    if (value == null) return "";
+    const ends = (low, high) => [low, high].map(end => shown(plot.data[end + 1][row])).join(" … ");
+    const band = chart.bands.find(([high]) => high === k);
+    if (band) return ends(band[1], k);
+    const bar = chart.errors.find(([at]) => at === k);
+    return bar ? `${shown(value)} (${ends(bar[1], bar[2])})` : shown(value);
   }
 
-  // Both ends of the error bar, behind the value of its point.
-  function range(chart, plot, k, row) {
-    const bar = (chart.errors || []).find(([at]) => at === k);
-    if (!bar) return "";
-    const [low, high] = bar.slice(1).map(end => shown(plot.data[end + 1][row]));
-    return ` (${low} … ${high})`;
-  }
-
-  const isEdge = each => !each.points && each.width === 0;
-
-  // Opacity as two digits behind a colour.
-  const hex = share => Math.round(255 * share).toString(16).padStart(2, "0");
-
-  // How strong each band looks, by the place of its upper end: a band lies on the paler
-  // ones that were drawn before it.
-  function strengths(chart) {
-    let clear = 1, before = 0;
-    return Object.fromEntries(chart.bands.map(([high, low, strength]) => {
-      clear = (strength > before ? clear : 1) * (1 - strength);
-      before = strength;
-      return [high, 1 - clear];
-    }));
-  }
-
-  // Bands are as pale as they are drawn, dashed lines hollow.
-  function marker(chart, k) {
-    const each = chart.series[k], strength = strengths(chart)[k];
-    if (each.dashed) return "transparent";
-    return each.colour && isEdge(each) && strength
-      ? each.colour + hex(strength) : each.colour || ink("--ink").trim();
-  }
-
-  // The lower end of each band by its upper one, of those without lines.
-  function bandsOf(chart) {
-    return Object.fromEntries(chart.bands.filter(([high]) => isEdge(chart.series[high])));
+  function filled(chart, k) {
+    const each = chart.series[k], band = chart.bands.find(([high]) => high === k);
+    return each.dashed ? "transparent" : band ? each.colour + hex(band[2]) : hue(each);
   }
 
   function sized(chart, which) {
@@ -181,67 +96,59 @@ function touch(figure) {
     return {width: width, height: Math.min(chart.height, 0.9 * width)};
   }
 
-  function draw() {
-    for (const plot of drawn) plot.destroy();
-    const line = ink("--line"), text = ink("--soft");
-    const hue = each => each.colour || ink("--ink").trim();
-    drawn = charts.map((chart, which) => {
-      const every = charts.filter(each => each.x === chart.x)
-        .flatMap(each => [each.data[0][0], each.data[0].at(-1)]);
-      const ends = {min: Math.min(...every), max: Math.max(...every)};
-      const margin = 0.02 * (ends.max - ends.min), isLogX = isLog(chart, 0);
-      const all = isLogX ? [ends.min / 1.1, ends.max * 1.1]
-        : chart.names.length ? [0.4, chart.names.length + 0.6]
-        : [ends.min - margin, ends.max + margin];
-      const band = bandsOf(chart);
-      return new uPlot({
+  function options(chart, which) {
+    const every = charts.filter(each => each.x === chart.x)
+      .flatMap(each => [each.data[0][0], each.data[0].at(-1)]);
+    const low = Math.min(...every), high = Math.max(...every), margin = 0.02 * (high - low);
+    const all = chart.log[0] ? [low / 1.1, high * 1.1] : [low - margin, high + margin];
+    const [first, last] = [chart.data[0][0], chart.data[0].at(-1)];
+    const dashed = k => k && chart.series[k - 1].dashed;
+    return {
       ...sized(chart, which),
       cursor: {sync: {key: syncs[chart.x].key, scales: ["x", null]}, drag: {x: true, y: false}},
       title: chart.title || undefined,
-      scales: {x: {time: false, distr: isLogX ? 3 : 1, range: (_, low, high) =>
-        low === chart.data[0][0] && high === chart.data[0].at(-1) ? all : [low, high]},
-        y: {distr: isLog(chart, 1) ? 3 : 1,
-          range: (_, low, high) => spanned(chart, low, high)}},
+      scales: {
+        x: {time: false, distr: chart.log[0] ? 3 : 1,
+          range: (_, from, to) => from === first && to === last ? all : [from, to]},
+        y: {distr: chart.log[1] ? 3 : 1, range: (_, from, to) => spanned(chart, from, to)},
+      },
       legend: {markers: {
-        width: (_, k) => !k ? 0 : chart.series[k - 1].dashed ? 2 : isEdge(chart.series[k - 1]) ? 1 : 0,
-        dash: (_, k) => k && chart.series[k - 1].dashed ? "dashed" : "solid",
+        width: (_, k) => !k ? 0 : dashed(k) ? 2 : isEdge(chart.series[k - 1]) ? 1 : 0,
+        dash: (_, k) => dashed(k) ? "dashed" : "solid",
         stroke: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
-        fill: (_, k) => k ? marker(chart, k - 1) : "transparent",
+        fill: (_, k) => k ? filled(chart, k - 1) : "transparent",
       }},
-      axes: [chart.x, chart.y].map(label => ({
-        label: label, stroke: text, grid: {stroke: line, width: 1},
-        show: label === chart.x || chart.ticks !== false,
-        ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
-        ...(label === chart.x && chart.names.length
-          ? named(chart) : {values: (_, places) => places.map(shown)}),
+      axes: [chart.x, chart.y].map((label, k) => ({
+        label: label, stroke: ink("--soft"), grid: {stroke: ink("--line"), width: 1},
+        ticks: {stroke: ink("--line"), width: 1}, size: k ? 62 : 44,
+        values: (_, places) => places.map(shown),
       })),
-      series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
+      series: [{label: chart.x, value: (_, value) => shown(value)}].concat(
         chart.series.map((each, k) => ({
-          label: k in band ? each.label.replace(/, [^,]*( \[[^\]]*\])$/, "$1") : each.label,
-          stroke: hue(each), width: each.points ? 0 : each.width,
+          label: each.label, stroke: hue(each), width: each.points ? 0 : each.width,
           dash: each.dashed ? [3, 4] : undefined,
           paths: each.points ? () => null : undefined,
           points: {show: each.points, size: 6, fill: hue(each), width: 0},
-          value: (plot, value, _, row) => k in band && value != null
-            ? shown(plot.data[band[k] + 1][row]) + " … " + shown(value)
-            : value == null ? "" : shown(value) + range(chart, plot, k, row),
+          value: (plot, value, _, row) => valued(chart, plot, value, k, row),
         }))),
-      bands: chart.bands.map(([high, low, strength]) => ({
-        series: [high + 1, low + 1],
-        fill: chart.series[high].colour + hex(strength),
+      bands: chart.bands.map(([high, low, share]) => ({
+        series: [high + 1, low + 1], fill: chart.series[high].colour + hex(share),
       })),
-      hooks: {ready: [moving], drawAxes: [plot => drawRules(plot, chart)],
-        draw: [plot => drawErrors(plot, chart)]},
-    }, chart.data, cells[which]); });
+      hooks: {drawAxes: [plot => drawRules(plot, chart)], draw: [plot => drawErrors(plot, chart)]},
+    };
+  }
+
+  function draw() {
+    for (const plot of drawn) plot.destroy();
+    drawn = charts.map((chart, k) => new uPlot(options(chart, k), chart.data, cells[k]));
     drawn.forEach((plot, which) => {
       syncs[charts[which].x].sub(plot);
-      // Both ends of a band share a line; bands of several curves would fill the page.
-      const {series} = charts[which], band = bandsOf(charts[which]);
-      const many = Object.keys(band).filter(k => series[k].label).length > 4;
+      // The legends of many bands would fill the page.
+      const {series, bands} = charts[which];
+      const many = bands.filter(([high]) => series[high].label).length > 4;
       const rows = plot.root.querySelectorAll(".u-legend .u-series");
       series.forEach((each, k) => {
-        if (!each.label || isEdge(each) && (many || !(k in band)))
-          rows[k + 1].style.display = "none";
+        if (!each.label || many && isEdge(each)) rows[k + 1].style.display = "none";
       });
     });
   }
