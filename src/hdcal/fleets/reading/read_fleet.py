@@ -64,8 +64,6 @@ def read_fleet(
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    if isinstance(data, FleetReadings):
-        return data
     how: dict = {"columns": columns, "theory": theory, "reading": reading}
     how |= {"range": range}
     if is_parquet(data):
