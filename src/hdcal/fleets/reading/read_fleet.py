@@ -62,8 +62,6 @@ def read_fleet(
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    if isinstance(data, FleetReadings):
-        return data
     how: dict = {"columns": columns, "theory": theory, "range": range}
     if is_parquet(data):
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
