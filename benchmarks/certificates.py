@@ -27,8 +27,8 @@ from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.sample import sample
 from hdcal.prediction.conditions import Conditions
+from hdcal.prediction.joint import joint
 from hdcal.prediction.members import one_member
-from hdcal.prediction.models import models_of
 from hdcal.prediction.simulate import simulate
 
 RIGS, AT = 300, 0.4
@@ -161,7 +161,7 @@ def sampled(case: Case, seed: int) -> Posterior:
 
 def intervals(posterior: Posterior) -> dict[str, np.ndarray]:
     """Return 95 % intervals of load, stiffness and the next reading."""
-    (model,) = models_of(posterior)
+    model = joint(posterior)
 
     def at(quantity):
         warm = posterior.case.gear.reference_temperature

@@ -13,9 +13,7 @@ from moving import still_posterior
 import hdcal
 from hdcal.__main__ import hdcal as program
 from hdcal.cli.option_types import Parsed
-from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
-from hdcal.data.measurements.force_table import read_columns
 from hdcal.data.measurements.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
 from hdcal.data.tables.headers import DIMENSIONS
@@ -65,15 +63,12 @@ def header(quantity: str) -> str:
 
 def column(quantity: str, value, folder: Path) -> None:
     """Read a table with one such cell."""
-    names = [header(quantity), *map(header, ("deformation", "force"))]
+    others = ("angle",) if quantity == "torque" else ("deformation", "force")
+    names = [header(quantity), *map(header, others)]
     names = [*dict.fromkeys(names)]
     rows = [",".join([repr(value), *["0"] * (len(names) - 1)]) for _ in range(6)]
     file = folder / "data.csv"
     file.write_text("\n".join([",".join(names), *rows]) + "\n")
-    if quantity == "torque":
-        with FileFindings("data.csv") as findings:
-            kinds = {"quantities": ("torque",), "required": ("torque",)}
-            read_columns(file, None, findings, **kinds)
     read_measurements(file)
 
 
@@ -126,7 +121,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         {"direction": "sideways"},
         (
             *("deformation", "limit_force", "given_force", "temperature", "content"),
-            *("confidence", "required_probability", "seed", "tolerances"),
+            *("confidence", "seed", "tolerances"),
         ),
     ),
     (
@@ -158,17 +153,12 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         {"force": "push"},
         ("amplitude", "duration", "points", "mass", "damping", "draws", "seed"),
     ),
-    (hdcal.respond, {"force": "sine", "draws": 1}, ("frequency",)),
     (
         lambda run, **asked: hdcal.calibrate(run.case, **asked),
         {"effects": ["nothing"]},
         ("chains", "warmup", "draws", "seed"),
     ),
-    (
-        lambda run, **asked: hdcal.Tracker(run, **{"reopen": -1.0, **asked}),
-        {},
-        ("alarm_rows", "reopen"),
-    ),
+    (hdcal.Tracker, {}, ("alarm_rows",)),
     (lambda run, **asked: hdcal.fit(run.case, **asked), {}, ("degrees", "at")),
     (lambda run, **a: hdcal.causes(run.case, **{"seed": -1, **a}), {}, ("jobs",)),
 ]

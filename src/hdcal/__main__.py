@@ -21,8 +21,7 @@ from hdcal.comparison.command import compare
 from hdcal.design.command import design, study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
-from hdcal.fleets.command import fleet
-from hdcal.fleets.margin_command import margin
+from hdcal.fleets.command import fleet, margin
 from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.shared_causes.command import causes

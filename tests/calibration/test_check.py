@@ -16,7 +16,7 @@ SLOPES = {"A": 100.0, "B": 120.0, "C": 90.0}
 HEADERS = {"A": "deformation_mm,force_N", "B": "deformation_um;Load [kN]"}
 SIZES = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40.0\nlength_mm = 70.0\n"
 STATED_BY = """[measurement]
-force_calibration = { iso376_class = "0.5", expanded_N = 0.3, k = 3 }
+force_calibration = { expanded_percent = 0.27, expanded_N = 0.3, k = 3 }
 deformation_calibration = { expanded_percent = 0.2, expanded_mm = 0.004 }
 temperature_calibration = { expanded_K = 1.0 }
 """

@@ -17,12 +17,8 @@ LONG = "x" * 50_000
     [
         (["predict", "--deformation", "99"], "--deformation"),
         (["margin", "--deformation", ".4", "--content", "9"], "--content"),
-        (["margin", "--deformation", ".4", "--tolerance", "size=1"], "--tolerance"),
         (["design", "--window", ".4:.3"], "--window"),
-        (["design", "--window", ".3:.4", "--spring-rate", "9:1"], "--spring-rate"),
-        (["design", "--window", ".3:.4", "--temperature=-300:0"], "--temperature"),
         (["study", "--vary", "radius_mm=38", "--material", "stel"], "stel.toml"),
-        (["respond", "--force", "step", "--draws", "3"], "--draws"),
         (["respond", "--force", "step", "--mass-kg", "-1"], "--mass-kg"),
         (["calibrate", "--chains", "1"], "--chains"),
         (["calibrate", "--effect", "outlier"], "--effect"),

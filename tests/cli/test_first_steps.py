@@ -34,12 +34,11 @@ def test_check_writes_a_gear_file_of_what_it_read(here: Hdcal, log: Path):
     assert again.returncode == 2 and not (log.parent / "other.toml").exists()
 
 
-@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_check_draws_the_readings(here: Hdcal, log: Path, ending, begins):
-    picture = log.with_suffix(f".{ending}")
+def test_check_draws_the_readings(here: Hdcal, log: Path):
+    picture = log.with_suffix(".png")
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
         assert here("check", log, "--plot", picture, *more).returncode == code
-    assert picture.read_bytes().startswith(begins)
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert here("check", log, "--plot", log.with_suffix(".pdf")).returncode == 2
     # A file of another program is never replaced.
     picture.write_text("mine")
@@ -61,7 +60,7 @@ def test_init_makes_a_case(here: Hdcal, log: Path):
     assert library.read_case(log).gear.reading == "diametral"
 
 
-def test_init_joins_the_sheets_of_a_workbook(here: Hdcal, tmp_path: Path):
+def test_init_writes_a_sheet_of_a_workbook(here: Hdcal, tmp_path: Path):
     book = openpyxl.Workbook()
     for name in ("A", "B"):
         sheet = book.create_sheet(name)
@@ -72,11 +71,8 @@ def test_init_joins_the_sheets_of_a_workbook(here: Hdcal, tmp_path: Path):
     book.save(tmp_path / "book.xlsx")
     given = ("init", tmp_path / "rig", *BEGUN, "--data", tmp_path / "book.xlsx")
     assert here(*given).returncode == 2
-    done = here(*given, "--sheet", "*")
-    assert done.returncode == 0
-    assert "Next: hdcal fleet" in " ".join(done.stderr.split())
-    case = library.read_case(tmp_path / "rig")
-    assert case.specimen_labels == ("A", "B") and len(case.records.force) == 16
+    assert here(*given, "--sheet", "B").returncode == 0
+    assert len(library.read_case(tmp_path / "rig").records.force) == 8
 
 
 @pytest.mark.parametrize(
@@ -88,10 +84,8 @@ def test_init_joins_the_sheets_of_a_workbook(here: Hdcal, tmp_path: Path):
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
         ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),
         (["--wall", "0,68", *BEGUN[2:]], "'0,68' is no number: write 0.68"),
-        (["--wall", "1,234.5", *BEGUN[2:]], "'1,234.5' is no number"),
         (["--wall", "inf", *BEGUN[2:]], "'inf' is no number"),
         ([*BEGUN, "--data", "nowhere.csv", "--column", "force"], "--column: "),
-        ([*BEGUN, "--sheet", "A"], "--sheet: "),
     ],
 )
 def test_init_refuses_bad_input(here: Hdcal, tmp_path, given, words):

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.tables.text import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"
@@ -40,7 +39,7 @@ CASES = {
         timed(1, 1, -1, 1, 1, header=T.replace("time_s", "force_sd_N")),
         [(4, "force_sd_N", "between 0 and 1000000000 N")],
     ),
-    "long line": (H.encode() + b"1" * (LONGEST_LINE + 300_000), [(2, None, "1 MiB")]),
+    "long line": (H.encode() + b"1" * ((1 << 20) + 300_000), [(2, None, "1 MiB")]),
     "many at once": (
         "deformation_mm,force_psi,time_s,temperature_C\n"
         "0,0,0,20\nx,1,1,20\n2,2,0.5,-400\n3,3\n4,4,9,inf\n5,5,10,20\n",
@@ -64,7 +63,6 @@ CASES = {
 # Content, row, column and words of the only finding.
 ONE = [
     (H + "0,0\n1,1\n2,2\n3,3\n", None, None, "4 rows"),
-    ("deformation_mm\n0\n1\n2\n3\n4\n", 1, "force", "no column"),
     ("deformation_mm,force_psi\n" + GOOD, 1, "force_psi", "psi"),
     ("deformation_mm,force\n" + GOOD, 1, "force", "no unit"),
     (
@@ -73,23 +71,19 @@ ONE = [
         "force_kN",
         "two columns",
     ),
-    (fourth("four"), 4, "force_N", "'four'"),
-    (fourth("1_0"), 4, "force_N", "not a number"),
     (fourth("nan"), 4, "force_N", "not a number"),
-    (fourth("-inf"), 4, "force_N", "not a number"),
     (fourth("1e999"), 4, "force_N", "too large"),
     (fourth("1e200"), 4, "force_N", "does not lie between"),
     (fourth(""), 4, "force_N", "empty"),
     (H + GOOD.replace(".2,4", ".2"), 4, None, "1 cells"),
     (H + GOOD.replace(".2,4", "0,2,4,0"), 4, None, "semicolons"),
-    (H + GOOD.replace(".2,4", '".2,4'), 4, None, "not closed"),
+    (H + GOOD.replace(".2,4", '".2,4'), 4, None, "close each quotation mark"),
     (H + "1,1\n" * 5, None, "deformation_mm", "constant"),
     (timed(0, 1, 2, 1, 3), 5, "time_s", "goes back"),
     (timed("a", "a", " ", "b", "b", header=R), 4, "run", "label is empty"),
     (H + GOOD.replace(".5", "500"), 7, "deformation_mm", "radius"),
     ("\n" + H + "0,0\n\n\n1,1\n2,oops\n3,3\n4,4\n5,5\n", 7, "force_N", "'oops'"),
     (H.encode() + b"0,0\n\0\1\n", None, None, "binary"),
-    (b"PK\x03\x04junk", None, None, "workbook"),
     (b"\xff\xfea\0b", None, None, "UTF-16"),
     (f"deformation_mm,force[{' ' * 50_000}x\n" + GOOD, 1, "force", "no column"),
 ]
@@ -174,12 +168,6 @@ def labelled(folder, *columns):
         table[header] = np.repeat(cells, 12 // len(cells))
     table.to_csv(folder / "data.csv", index=False)
     return folder / "data.csv"
-
-
-def test_a_number_for_each_reading_is_no_label(folder):
-    case = read_case(labelled(folder, ("Messung Nr", *range(12))))
-    assert len(case.run_labels) == 1
-    assert any("Messung Nr" in note and "not used" in note for note in case.notes)
 
 
 def test_two_columns_that_may_both_name_the_gear_are_asked_about(folder):

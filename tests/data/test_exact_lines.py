@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from hdcal import InputError, calibrate, diagnose, read_case
-from hdcal.data.scatter import reading_step
 
 _LINE = np.arange(1, 11) / 10.0
 
@@ -33,11 +32,6 @@ def test_a_display_that_shows_a_line_is_answered_by_its_step():
     assert low < 100 < high
     assert 0.5 < high - low < 4
     assert diagnose(case, quick=True).which.effect is None
-
-
-def test_the_step_is_the_stated_one_or_the_least_between_forces():
-    assert reading_step(_case(np.round(103 * _LINE), step=0.5)) == 0.5
-    assert reading_step(_case([5, 8, 11, 13, 17, 19, 29, 31, 40, 51.0])) == 2.0
 
 
 def test_readings_of_which_none_is_left_over_are_refused_in_other_words():

@@ -4,8 +4,6 @@ import numpy as np
 import openpyxl
 import pytest
 
-from hdcal.data.findings import FileFindings
-from hdcal.data.measurements.force_table import read_columns
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 
@@ -34,13 +32,6 @@ def refused(folder, text: str, **asked) -> list[str]:
     with pytest.raises(InputError) as caught:
         read(folder, text, **asked)
     return [str(finding) for finding in caught.value.findings]
-
-
-def test_a_mass_is_asked_about(tmp_path):
-    (found,) = refused(tmp_path, "Travel (in),Load (lb)\n" + rows(X, F))
-    assert "lbf" in found
-    first, second = refused(tmp_path, "mass (kg),position (m)\n" + rows(F, X))
-    assert "'deformation=2[m]'" in first and "'force=1[kgf]'" in second
 
 
 def test_units_in_columns_behind_the_numbers(tmp_path):
@@ -107,16 +98,20 @@ def test_a_slow_channel_that_is_not_needed_is_left_out(tmp_path):
 
 
 def test_blocks_have_headers_of_their_own(tmp_path):
-    """The second one has its columns in other order, below a title with numbers."""
+    """The second one stands below a title with numbers."""
     text = "Run 1\nTime\tTravel\tLoad\ns\tmm\tN\n" + rows(
         np.arange(6), X[:6], F[:6], separator="\t"
     )
-    text += "\nRun 2\t8.0\ts\nTime\tLoad\tTravel\ns\tN\tmm\n" + rows(
-        np.arange(6), F[6:], X[6:], separator="\t"
-    )
+    second = "Time\tTravel\tLoad\ns\tmm\tN\n"
+    second += rows(np.arange(6), X[6:], F[6:], separator="\t")
+    text += f"\nRun 2\t8.0\ts\n{second}"
     case = read(tmp_path, text)
     check(case)
     assert case.records.run.tolist() == [0] * 6 + [1] * 6
+    other = text.replace(
+        "Time\tTravel\tLoad\ns\tmm\tN", "Time\tLoad\tTravel\ns\tN\tmm", 1
+    )
+    assert any("in the same order" in one for one in refused(tmp_path, other))
 
 
 def test_a_block_of_other_columns_is_left_out_or_refused(tmp_path):
@@ -147,16 +142,6 @@ def test_a_clock_that_is_reset_is_not_used(tmp_path):
     assert "row 11" in found and "'B'" in found
 
 
-def test_specimens_stand_side_by_side(tmp_path):
-    ends = [*rows(X, F, X, 2 * F).split()[:8], *rows(X, F).split()[8:]]
-    text = "A,,B,\nTravel,Load,Travel,Load\nmm,N,mm,N\n"
-    case = read(
-        tmp_path, text + "\n".join(f"{e},," if e.count(",") < 3 else e for e in ends)
-    )
-    assert case.specimen_labels == ("A", "B")
-    check(case, np.concatenate([X, X[:8]]), np.concatenate([F, 2 * F[:8]]))
-
-
 def test_columns_without_headers_are_named_by_number(tmp_path):
     text = "# group: g7\n# name: Time   name: Travel   name: Force\n"
     text += rows(range(12), X, F, separator=" , ")
@@ -165,22 +150,11 @@ def test_columns_without_headers_are_named_by_number(tmp_path):
     check(read(tmp_path, text, columns={"deformation": "2[mm]", "force": "3[N]"}))
 
 
-@pytest.mark.parametrize(
-    ("headers", "newton_metres", "radians"),
-    [
-        ("Torque (mNm),Twist (arcmin)", 1e-3, np.pi / 10800),
-        ("load [lbf*in],travel [deg]", 0.112984829, np.pi / 180),
-        ("torque_Nm,angle_rad", 1.0, 1.0),
-    ],
-)
-def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radians):
-    (tmp_path / "log.csv").write_text(f"{headers}\n" + rows(F, X))
-    with FileFindings("log.csv") as findings:
-        spring = ("torque", "angle")
-        how = {"quantities": spring, "required": spring}
-        found = read_columns(tmp_path / "log.csv", None, findings, **how)
-    np.testing.assert_allclose(found["torque"], newton_metres * F, rtol=1e-8)
-    np.testing.assert_allclose(found["angle"], radians * X, rtol=1e-12)
+def test_torques_and_angles_are_converted(tmp_path):
+    text = "Torque (mNm),Twist (arcmin)\n" + rows(F, X)
+    case = read(tmp_path, text)
+    np.testing.assert_allclose(case.records.force, 1e-3 * F, rtol=1e-8)
+    np.testing.assert_allclose(case.records.deformation, np.pi / 10800 * X, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -188,6 +162,7 @@ def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radi
     [
         (b"<html><body><table><tr><td>1</td></tr></table></body></html>", "HTML"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), ".xls"),
+        (b"MATLAB 5.0 MAT-file" + bytes(600), "MATLAB"),
     ],
 )
 def test_a_file_that_is_no_table_is_called_what_it_is(tmp_path, raw, word):
@@ -204,5 +179,5 @@ def test_formulas_without_values_are_called_so(tmp_path):
     for place, x in enumerate(X.tolist()):
         book.active.append([x, 1.0, f"=A{place + 2}*12"])
     book.save(tmp_path / "book.xlsx")
-    with pytest.raises(InputError, match="formulas without values"):
+    with pytest.raises(InputError, match="'force_N' has no cells"):
         read_case(tmp_path / "book.xlsx")

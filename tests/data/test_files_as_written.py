@@ -43,8 +43,6 @@ LABVIEW = "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
 BY_NUMBER = {"columns": {"deformation": "1[mm]", "force": "2[N]"}}
 # Content; further columns as they are meant; further arguments of `read_case`.
 FILES = {
-    "hdcal's own": (text("deformation_mm,force_N\n", BODY),),
-    "a title": (text("Flexspline 12, second\ndeformation_mm,force_N\n", BODY),),
     "a preamble of a test controller": (
         text(
             "MTS793|BTW|ENU|1|2|.|/|:|1|0|0|A\n\nData Header:,,,\nTime:,12.3,Sec,\n"
@@ -66,28 +64,15 @@ FILES = {
     "Chinese in GB18030": (
         text("试验报告\n位移(mm),载荷(kN)\n", lines(force=1e3)).encode("gb18030"),
     ),
-    "UTF-16": (text("deformation_mm\tforce_N\n", TABS).encode("utf-16"),),
     "marked headers": (
         text("# displacement_mm force is in N\n# displacement_mm\tload_N\n", TABS),
     ),
     "no headers": (text(BODY), {}, BY_NUMBER),
-    "one header twice": (
-        text("Weg [mm],Kraft [N],Kraft [N]\n", lines(more=FORCE + 1.0)),
-        *({}, {"columns": {"force": "2"}}),
-    ),
     "units behind a slash": (text("Weg / mm;Load / kN\n", lines(";", ",", 1e3)),),
     "a setpoint": (
         text("Displacement setpoint (mm),Displacement (mm),Force (N)\n")
         + "".join(f"9,{row}" for row in BODY),
     ),
-    "gears": (
-        text("deformation_mm,force_N,gear\n", lines(more=np.repeat([7, 8], 3))),
-        {"specimen": TWO_RUNS["run"]},
-    ),
-    "columns separated by blanks": (
-        text("  deformation_mm    force_N\n", lines("      ")),
-    ),
-    "blanks behind commas": (text("Deformation [mm], Force [N]\n", lines(", ")),),
     "blocks that name their run": (
         "deformation_mm,force_N,Mounting\n"
         + "".join(f"{row[:-1]},7\n" for row in BODY[:3])
@@ -159,7 +144,7 @@ def test_a_file_is_read_as_it_is_meant(folder, habit):
     # Assumptions come first among the notes.
     assumed = [note.startswith("ASSUMED") for note in case.notes]
     assert assumed == sorted(assumed, reverse=True)
-    assert any(assumed) or habit in ("hdcal's own", "UTF-16", "no headers", "a footer")
+    assert any(assumed) or habit in ("no headers", "a footer")
 
 
 REFUSED = [

@@ -1,9 +1,8 @@
-"""Tables in memory, of Parquet and of MATLAB files are read to the last digit."""
+"""Tables in memory and of Parquet are read to the last digit."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.io import savemat
 
 import hdcal
 from hdcal.errors import InputError
@@ -63,33 +62,17 @@ def test_a_finding_names_row_and_column(folder):
             hdcal.read_case(data)
 
 
-def test_columns_that_are_only_counted_have_no_headers(tmp_path):
-    """The names 0 and 1 are no reading; a matrix of MATLAB has none either."""
-    counted = np.stack([X, KN], axis=1)
-    savemat(tmp_path / "a.mat", {"data": counted})
-    for data in (pd.DataFrame(counted), tmp_path / "a.mat"):
-        asked = {"deformation": "1[mm]", "force": "2[kN]"}
-        case = hdcal.read_case(data, columns=asked)
-        np.testing.assert_array_equal(case.records.deformation, X)
-        with pytest.raises(InputError, match="numbers where the headers should be"):
-            hdcal.read_case(data)
+def test_columns_that_are_only_counted_have_no_headers():
+    """The names 0 and 1 are no reading."""
+    counted = pd.DataFrame(np.stack([X, KN], axis=1))
+    asked = {"deformation": "1[mm]", "force": "2[kN]"}
+    case = hdcal.read_case(counted, columns=asked)
+    np.testing.assert_array_equal(case.records.deformation, X)
+    with pytest.raises(InputError, match="numbers where the headers should be"):
+        hdcal.read_case(counted)
 
 
-@pytest.mark.parametrize("shape", [(9,), (9, 1), (1, 9)])
-def test_vectors_of_a_mat_file(tmp_path, shape):
-    """Among what else a workspace holds: a rate, a name, a picture, a structure."""
-    vectors = {"deformation_mm": X.reshape(shape), "F": KN.reshape(shape)}
-    others = {"fs": 2500.0, "who": "M. K.", "picture": np.zeros((30, 40))}
-    for content in (vectors | others, {"log": vectors}):
-        savemat(tmp_path / "a.mat", content)
-        case = hdcal.read_case(tmp_path / "a.mat", columns={"force": "F[kN]"})
-        np.testing.assert_array_equal(case.records.force, 1000.0 * KN)
-    savemat(tmp_path / "a.mat", {"up": vectors, "down": vectors})
-    with pytest.raises(InputError, match="holds no one table"):
-        hdcal.read_case(tmp_path / "a.mat")
-
-
-@pytest.mark.parametrize("begins", [b"PAR1", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n"])
+@pytest.mark.parametrize("begins", [b"PAR1", b"\x89HDF\r\n"])
 def test_a_broken_file_is_refused(tmp_path, begins):
     (tmp_path / "a").write_bytes(begins + bytes(range(256)) * 4)
     with pytest.raises(InputError, match=r"is (no|an) \S+ file"):

@@ -31,14 +31,6 @@ def test_without_a_loop_the_turning_row_counts_as_loading():
         assert case.records.sense[TOP] == 1.0
 
 
-def test_a_reading_that_repeats_the_top_is_on_the_branch_of_its_force():
-    rows = _readings(False)
-    twice = {name: np.insert(v, TOP, v[TOP]) for name, v in rows.items()}
-    twice["force_N"][TOP] += 16.0
-    sense = hdcal.read_case(twice).records.sense
-    assert sense[TOP : TOP + 2].tolist() == [1.0, -1.0]
-
-
 def test_the_diagnosis_is_the_same_on_either_side():
     found = [
         hdcal.diagnose(hdcal.read_case(_readings(before)), quick=True)

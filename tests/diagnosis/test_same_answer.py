@@ -64,10 +64,7 @@ CHANGES = {
     "stiffer and smaller": {"force": 37.0, "deformation": 0.21},
     "pulled": {"force": -1.0, "deformation": -1.0},
     "six digits": {"number": "%.6g"},
-    "kN, µm and minutes": {
-        "units": ("um", "kN", "min"),
-        "sizes": (1e-3, 1e3, 60.0),
-    },
+    "kN, µm and minutes": {"units": ("um", "kN", "min"), "sizes": (1e-3, 1e3, 60.0)},
 }
 
 

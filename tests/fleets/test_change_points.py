@@ -90,16 +90,17 @@ def test_evidences_are_those_of_dense_covariances():
     day, value, variance, time = measured(rng, "steps", many=9, dates=4, size=1.0)
     value = value - np.median(value)
     sums = change_points._sums(day, value, variance)
+    segments, unchanged = change_points._segments(sums)
     scatter = np.sqrt(sums.level[:, 0]) / change_points._LEVELS
     begin = change_points._EXPECTED / (len(time) - 1)
     none = sums.segment([0], [4])[:, 0]
-    steps, begins = change_points._partitions(sums, none)
+    every = change_points._partitions(segments)[:, -1]
     line = change_points._line(sums, np.linspace(-0.5, 0.5, 4))[0]
     offset = 0.5 * len(value) * np.log(2.0 * np.pi)
     for row in (0, 12, 24):
         own = np.diag(scatter[row] ** 2 + variance)
         level = sums.level[row, 0]
-        parts, where = [], []
+        parts = []
         for cuts in product([False, True], repeat=3):
             ends = [0, *(np.flatnonzero(cuts) + 1), 4]
             group = np.searchsorted(ends[1:-1], day, side="right")
@@ -107,13 +108,9 @@ def test_evidences_are_those_of_dense_covariances():
             law = multivariate_normal(cov=own + level * same)
             chance = np.prod([begin if cut else 1.0 - begin for cut in cuts])
             parts.append(law.logpdf(value) + np.log(chance))
-            where.append(cuts)
-        alone = (1.0 - begin) ** 3
-        assert none[row] - offset == pytest.approx(parts[0] - np.log(alone))
-        some = logsumexp(parts[1:])
-        assert steps[row] - offset == pytest.approx(some - np.log(1.0 - alone))
-        share = np.exp(np.array(parts[1:]) - some)
-        assert begins[row, 1:] == pytest.approx(share @ np.array(where[1:], float))
+        assert unchanged == pytest.approx(3.0 * np.log(1.0 - begin))
+        assert none[row] - offset == pytest.approx(parts[0] - unchanged)
+        assert every[row] - offset == pytest.approx(logsumexp(parts))
         place = np.linspace(-0.5, 0.5, 4)[day]
         slope = multivariate_normal(
             cov=own + level * (1.0 + 4.0 * np.outer(place, place))

@@ -5,8 +5,8 @@ import pytest
 from gear_rows import ordinary
 from scipy.stats import binomtest
 
-from hdcal.fleets.model.gear_quantity import MOST_FALSE
-from hdcal.fleets.model.population import QUANTITIES, FittedFleet, fit_population
+from hdcal.fleets.gear_table import QUANTITIES
+from hdcal.fleets.model.population import FittedFleet, fit_population
 from hdcal.fleets.model.sampling import Sampling
 
 
@@ -23,9 +23,7 @@ def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
 
 
 def flagged(found: FittedFleet) -> dict[str, list[int]]:
-    sure = 1.0 - MOST_FALSE
-    each = {name: found.gears[f"off_{name}"] >= sure for name in QUANTITIES}
-    return {name: np.flatnonzero(odd).tolist() for name, odd in each.items()}
+    return {name: np.flatnonzero(found.flagged(name)).tolist() for name in QUANTITIES}
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,6 @@ def test_options_without_a_meaning_are_refused_at_once(file: Path, here: Hdcal):
     given = {
         "--temperature": "20:30",
         "--given-force": 80,
-        "--required-probability": 0.9,
         "--population": "readings",
         "--quantity": "load",
         "--direction": "down",

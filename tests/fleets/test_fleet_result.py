@@ -144,7 +144,7 @@ def test_the_result_keeps_its_schema_and_shows_itself():
     obeys(answer, Fleet)
     assert answer["schema"] == "hdcal.fleet/2" and answer["next_force"]["beyond_tested"]
     assert fleet.plot(Figure().add_subplot()).get_xlabel()
-    assert {"gears", "curves", "scatter"} <= fleet.charts().keys()
+    assert {"gears", "curves"} <= fleet.charts().keys()
     (odd,) = (
         mark
         for mark in fleet.charts()["gears"].panels[0].marks
@@ -216,7 +216,7 @@ def test_the_command_leaves_a_folder(hdcal: Hdcal, tmp_path: Path):
     folder = tmp_path / "line-fleet"
     names = {path.name for path in folder.iterdir()}
     assert {"gears.csv", "gears.parquet", "summary.json", "posterior.nc"} <= names
-    assert {"report.html", "gears.png", "curves.svg", "scatter.svg"} <= names
+    assert {"report.html", "gears.png", "curves.svg"} <= names
     answer = json.loads((folder / "summary.json").read_text("utf-8"))
     obeys(answer, Fleet)
     assert json.loads(done.stdout) == answer
@@ -232,8 +232,6 @@ def test_the_command_leaves_a_folder(hdcal: Hdcal, tmp_path: Path):
         (("--limit-force", 90), ["--limit-force"]),
         (("--deformation", "abc"), ["--deformation"]),
         (("--force-tolerance", -1, "--seed", -1), ["--seed", "--force-tolerance"]),
-        (("--since", "yesterday"), ["--since"]),
-        (("--since", "2026-01-01"), ["--since"]),
         (("--scheduler", "tcp://x:1"), ["--scheduler"]),
         (("--gears", "none.csv"), ["none.csv"]),
     ],

@@ -186,18 +186,6 @@ def test_files_that_are_no_table_of_gears_are_refused(tmp_path):
     assert refused(read_fleet, frame, scheduler="tcp://127.0.0.1:1")
 
 
-def test_readings_since_a_day_may_be_none_of_the_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_readings, "_SHOWN", 60)
-    frame = labelled()
-    frame.to_parquet(tmp_path / "line.parquet", index=False)
-    found = usable(read_fleet(tmp_path / "line.parquet").since("2026-04-03"))
-    whole = usable(read_fleet(frame[frame["date"] >= "2026-04-03"]))
-    assert len(found.case.records.force) == 0
-    same(found, whole)
-    assert "no dates" in refused(read_fleet(records()).since, "2026-04-03")[0]
-    assert "is no day" in refused(found.since, "yesterday")[0]
-
-
 @pytest.mark.parametrize("batch", [90, 1 << 18])
 def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch, batch):
     monkeypatch.setattr(parquet, "_BATCH", batch)

@@ -100,7 +100,6 @@ def test_a_fault_is_named_and_its_gear_left_out_whole(
         mine, theirs = (getattr(each.sums, name)[..., kept] for each in (left, whole))
         mine, theirs = (m if name == "mean" else m[:, kept] for m in (mine, theirs))
         assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-9), name
-    assert usable(left) is left
 
 
 def test_without_a_fault_no_gear_is_left_out_and_noise_alone_is_none():

@@ -13,7 +13,7 @@ from schema_checks import obeys
 from hdcal import InputError, NotUsable, respond
 from hdcal.data.case import Gear
 from hdcal.inference.force_model.discrepancy import BASIS_SIZE
-from hdcal.motion import integration
+from hdcal.motion import gears_in_motion
 from hdcal.motion.respond import Response
 from hdcal.physics.linear_response import LinearGear, linear_response
 
@@ -59,7 +59,7 @@ def test_without_them_the_priors_are_the_answer():
 
 def test_the_band_is_as_wide_as_the_stiffness_is_uncertain(monkeypatch):
     """Also where the draws are integrated in several parts."""
-    monkeypatch.setattr(integration, "_MOST_STATES", 20 * SMALL["points"])
+    monkeypatch.setattr(gears_in_motion, "_MOST_STATES", 20 * SMALL["points"])
     slow = ([0.0, 0.019, 0.02], [0.0, 40.0, 40.0])
     found = respond(still_posterior(K=0.05), slow, **KNOWN, **SMALL)
     last, stiffness = found.motion.iloc[-1], found.estimates.stiffness_N_per_mm
@@ -157,17 +157,13 @@ def test_a_gear_in_tension_moves_as_the_mirror_image():
     [
         ("push", {}, "not a known force"),
         ("step", {"amplitude": 0.0}, "drives nothing"),
-        ("step", {"amplitude": np.nan}, "nan N does not lie"),
         ("step", {"amplitude": 1e6}, "even at rest"),
-        ("step", {"amplitude": -1e6}, "even at rest"),
         ("step", {"duration": 5e3}, "swings of the gear"),
-        ("sine", {}, "takes 1 frequencies"),
-        ("sine", {"frequency": 0.0}, "not positive"),
-        ("sine", {"frequency": 1001.0, "duration": 0.5}, "do not resolve"),
         ("step", {"damping": -1.0}, "does not lie between 0"),
         ("step", {"temperature": 2500.0}, "Young's modulus by half"),
         (([0.0, 1.0], [0.0, 0.0]), {}, "zero throughout"),
         (([0.0, 1.0], [0.0, np.inf]), {}, "holds inf N"),
+        (([1.0, 0.0], [0.0, 1.0]), {}, "do not rise"),
         (([0.0, 1.0], [0.0, 1.0]), {"duration": 1.0}, "has its own"),
     ],
 )

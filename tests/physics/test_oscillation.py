@@ -8,12 +8,7 @@ import pytest
 from hdcal import EFFECTS
 from hdcal.data.records import Geometry
 from hdcal.physics.chain import Base, Reading
-from hdcal.physics.dynamics import (
-    Oscillator,
-    integrate,
-    natural_frequency,
-    ring_mass,
-)
+from hdcal.physics.dynamics import Oscillator, integrate, natural_frequency, ring_mass
 from hdcal.physics.forcing import Chirp, SampledForce, Step
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.physics.theory import ring

@@ -20,8 +20,8 @@ from hdcal.inference.force_model.problem import build_problem
 from hdcal.inference.force_model.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.prediction.conditions import Conditions
+from hdcal.prediction.joint import joint
 from hdcal.prediction.members import one_member, over_draws
-from hdcal.prediction.models import models_of
 from hdcal.prediction.simulate import simulate
 
 FAIR, PREDICTIVE, HALVED = range(3)
@@ -68,12 +68,11 @@ def true_quantile(population: str, truth: dict, problem, content: float) -> floa
 
 def bounds(case, draws: dict, population: str) -> tuple[list[float], list[float]]:
     """Return bounds at both contents, and the predictive quantiles."""
-    (model,) = models_of(written_posterior(case, draws))
+    model = joint(written_posterior(case, draws))
     members = simulate(model, Conditions.of(AT, 20.0), population)
     one = one_member(members)
     fair = [
-        float(over_draws(members.quantile(p), members.weight, [CONFIDENCE])[0, 0])
-        for p in CONTENTS
+        float(over_draws(members.quantile(p), [CONFIDENCE])[0, 0]) for p in CONTENTS
     ]
     return fair, [float(one.quantile(p)[0, 0]) for p in CONTENTS]
 

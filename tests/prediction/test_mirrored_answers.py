@@ -60,8 +60,6 @@ def numbers(found: Margin) -> list[float]:
             listed += [risk.probability, risk.error, risk.lo, risk.hi, risk.beta]
     for row in found.budget:
         listed += [row.contribution_N, row.standard_uncertainty]
-    for model in found.models:
-        listed += [model.probability, *span(model.lower_bound_N, model.upper_bound_N)]
     if (reached := found.reached) is not None:
         listed += [sign * reached.median_mm, *span(reached.lo_mm, reached.hi_mm)]
         listed += span(reached.lower_bound_mm, reached.upper_bound_mm)

@@ -78,9 +78,7 @@ def test_margin_writes_a_folder(here: Hdcal, runs, tmp_path: Path):
     assert json.loads(result.stdout) == found
     obeys(found, Margin)
     assert found["population"] == "specimens" and len(found["levels"]) == 11
-    assert [model["probability"] for model in found["models"]] == [0.6, 0.4]
-    low, high = (model["upper_bound_N"] for model in found["models"])
-    assert low < found["worst"]["upper_bound_N"] < high
+    assert [*found["causes"].values()] == pytest.approx([0.6, 0.4])
     assert found["decision"]["rule"] == "simple"
     budget = rows((folder / "budget.csv").read_text("utf-8"))
     components = [row["component"] for row in found["budget"]]

@@ -13,7 +13,7 @@ from scipy import stats
 
 import hdcal
 from hdcal.prediction.conditions import Conditions
-from hdcal.prediction.models import models_of
+from hdcal.prediction.joint import joint
 from hdcal.prediction.simulate import simulate
 
 AT, SIZE = 0.4, 1000
@@ -54,8 +54,7 @@ KINDS = {
 
 def centre(posterior, quantity: str, at=AT, warm=20.0) -> np.ndarray:
     """Return the mean force of each draw without the bend."""
-    (model,) = models_of(posterior)
-    found = simulate(model, Conditions.of(at, warm, quantity=quantity))
+    found = simulate(joint(posterior), Conditions.of(at, warm, quantity=quantity))
     return (found.centre - found.common["bend"])[:, 0]
 
 

@@ -1,7 +1,6 @@
 """Every public result shows what matters most of it in a notebook's cell."""
 
-import inspect
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,20 +15,10 @@ import hdcal
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
 from hdcal.inference.force_model.residual_shapes import Structure
-from hdcal.notebook import RESULTS, Shown
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
 NAMES = ["Bands", "Case", "Diagnosis", "Fleet", "Margin", "Posterior"]
 NAMES += ["Residuals", "Response"]
-
-
-def test_every_public_result_is_shown():
-    public = [getattr(hdcal, name) for name in hdcal.__all__]
-    called = [one for one in public if inspect.isfunction(one)]
-    returned = [inspect.signature(one).return_annotation for one in called]
-    results = {c for c in returned if inspect.isclass(c) and is_dataclass(c)}
-    assert {c.__name__ for c in results} == {*RESULTS, "Case"}
-    assert all(issubclass(c, Shown) for c in results - {hdcal.Case})
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +74,6 @@ def test_tables_hold_what_the_results_say(results):
     for name in ("K", "stiffness"):
         low, middle, high = parameters.loc[name, ["lo", "median", "hi"]]
         assert low < middle < high
-    assert parameters["median"]["stiffness"] == np.median(posterior.draws["stiffness"])
     assert posterior.to_datatree() is posterior.tree
     fleet = results["Fleet"][0]
     drawn = fleet.to_datatree()["posterior"]["stiffness"]
@@ -100,19 +88,6 @@ def test_pyplot_is_asked_where_no_axes_are_given(results):
         axes = results["Bands"][0].plot()
         assert axes.figure.number in pyplot.get_fignums()
         pyplot.close(axes.figure)
-
-
-def test_a_failed_result_says_so_in_its_line(results):
-    reasons = ("the sampler diverged",)
-    failed = results["Diagnosis"][0].model_copy(update={"reasons": reasons})
-    assert repr(failed) == "<Diagnosis: FAILED, do not use>"
-
-
-def test_a_case_says_what_was_guessed_of_it(results):
-    case = hdcal.read_case(results["Case"][0].to_frame())
-    assert case.notes
-    shown = case._repr_html_()
-    assert "without a gear file the part is a spring" in shown
 
 
 def test_residuals_say_their_shapes(results):

@@ -42,7 +42,7 @@ def streams(
     start = start if known is None else with_correlation(start, known)
     for seed in range(count):
         rng = np.random.default_rng(seed)
-        one = every.take(rng.integers(len(every.model), size=1))
+        one = every.take(rng.integers(every.model.size, size=1))
         at = np.resize(places, rows) if len(places) > 2 else rng.uniform(*places, rows)
         forces = one.at(at, np.full(rows, warm))
         mean, _, excess, error, columns = (np.asarray(part)[:, 0] for part in forces)
@@ -168,15 +168,6 @@ def test_a_change_raises_the_alarm_soon(change, most):
         assert len(alarms[alarms >= 400])
         delays.append(alarms[alarms >= 400][0] - 399)
     assert np.median(delays) <= most
-
-
-def test_a_changed_stiffness_is_learned_anew_if_wanted():
-    found, truth = changed(softer=0.9, reopen=0.1), 0.9 * 205.0
-    assert found.stiffness[0] < truth < found.stiffness[1]
-    assert not np.any(found.alarms >= 700)
-    found = changed(softer=0.9)
-    assert not found.stiffness[0] < truth < found.stiffness[1]
-    assert np.any(found.alarms >= 700)
 
 
 def test_another_mounting_may_have_another_zero():

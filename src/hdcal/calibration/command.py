@@ -20,40 +20,40 @@ if TYPE_CHECKING:
     from hdcal.data.case import Case
 
 
-@command(short_help="From measurements to a result folder.")
+@command(short_help="Calibrate the force model against measurements.")
 @case_options
 @click.option(
     "--effect",
     "effects",
     metavar="NAME",
     multiple=True,
-    help="Include an effect of the library; may be repeated.",
+    help="Include an effect of the library. May be repeated.",
 )
 @click.option(
     "--with-gap/--no-gap",
     default=None,
-    help="Fit what no effect explains as a smooth leftover discrepancy, or leave it "
-    "out [default: fit it where the readings show a bend; never with an effect].",
+    help="Model a smooth leftover discrepancy, or leave it out [default: model it if "
+    "the readings show a bend; never with an effect].",
 )
 @click.option(
     "--constant-noise",
     is_flag=True,
-    help="Let the noise be of one size, also where it clearly grows with the force.",
+    help="Keep the noise constant, even if it clearly grows with the force.",
 )
 @click.option(
     "--dynamic",
     is_flag=True,
-    help="DATA are a gear that moves: calibrate mass, damping and stiffness.",
+    help="Calibrate mass, damping and stiffness from the motion of a gear.",
 )
 @sampling_options
-@folder_options("Result folder to make [default: NAME-calibration].")
+@folder_options("Write the result to DIR [default: NAME-calibration].")
 @json_option
 @click.pass_obj
 def calibrate(console: Console, data, out, force, dynamic, **settings):
     """Calibrate the force model against DATA and write a result folder.
 
-    With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
-    gear set in motion, and mass, damping and stiffness are calibrated.
+    With --dynamic DATA is a time series (time_s, deformation_mm, force_N) of one gear
+    in motion.
     """
     from hdcal.calibration.calibrate import choose_effects
     from hdcal.cli.progress import progress_bar

@@ -111,19 +111,6 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
     raise _refused(option, f"'{text}' is not LO:HI", "Write it like 0.38:0.42")
 
 
-def read_tones(text: str, option: str) -> list[float]:
-    """Read 5 or 5:200 as numbers.
-
-    Raises:
-        InputError: it is neither.
-    """
-    try:
-        return [float(part) for part in text.split(":")]
-    except ValueError:
-        remedy = "Write it like 5, or 5:200 for a chirp"
-        raise _refused(option, f"'{text}' is no frequency", remedy) from None
-
-
 def read_grid(text: str, option: str) -> list[float]:
     """Read START:STOP:COUNT or a list of numbers with commas."""
     try:
@@ -230,7 +217,7 @@ def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, st
 
 
 def read_list(texts: Sequence[str], option: str) -> list[str]:
-    """Read names that are repeated or listed with commas."""
+    """Read names that are repeated or separated by commas."""
     return [name.strip() for text in texts for name in text.split(",") if name.strip()]
 
 

@@ -15,7 +15,7 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
-from hdcal.data.theory_names import READINGS, Theory
+from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ def repeated_option(
 sheet_option = click.option(
     "--sheet",
     metavar="NAME",
-    help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
-    "several, each a specimen.",
+    help="Of a workbook (.xlsx) [default: the one with readings].",
 )
 column_option = repeated_option(
     "--column",
@@ -68,11 +67,6 @@ reading_options = combined(
         "--encoding",
         metavar="NAME",
         help="Decode the data file with this encoding [default: detected].",
-    ),
-    click.option(
-        "--reading",
-        type=click.Choice(READINGS),
-        help="Of the deformation, where the gear file is silent [default: radial].",
     ),
     click.option(
         "--specimen",
@@ -101,8 +95,7 @@ case_options = combined(reading_options, click.argument("data", metavar="DATA"))
 
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
-    names = "gear", "columns", "theory", "encoding", "sheet", "reading", "specimen"
-    names += ("range",)
+    names = "gear", "columns", "theory", "encoding", "sheet", "specimen", "range"
     return {name: settings.pop(name) for name in names}
 
 
@@ -161,13 +154,13 @@ start_options = combined(
     click.option(
         "--gear",
         metavar="GEAR.toml",
-        help="Without RUN: a gear of which priors are known.",
+        help="Use the priors of this gear instead of RUN.",
     ),
 )
 
 
 def material_option(help: str) -> Decorator:
-    """Return --material."""
+    """Return --material, with this help."""
     return repeated_option(
         "--material", "materials", metavar="NAME", read=read_list, help=help
     )

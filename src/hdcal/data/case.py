@@ -17,13 +17,14 @@ from hdcal.screening.result import Screening
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
 class Gear:
     """The gear file after reading; lengths in mm, temperatures in °C, forces in N.
+
+    Priors are in code units (MPa, 1/K, N, mm), keyed by parameter.
 
     Attributes:
         name: free text; untrusted, escape it before showing it in HTML.
@@ -35,21 +36,19 @@ class Gear:
         reference_temperature: where E(T) = E0 [°C].
         force_resolution: rounding step of the force reading [N], 0 = none given.
         nominal_deformation: design deformation [mm] or None.
-        priors: K, E0, alpha, force_offset, deformation_offset, sigma, in code units
-            (MPa, 1/K, N, mm), material and overrides already merged. K is the
-            influence coefficient under `ring` unless `K_theory` says otherwise; under
+        priors: K, E0, alpha, force_offset, deformation_offset and sigma, with material
+            and overrides. K is the influence coefficient under `K_theory`; under
             `spring` it is the stiffness [N/mm], and E0 is 1 MPa by definition.
         K_theory: the theory that the prior of K refers to.
         source: the TOML as read, for provenance.
-        scale_priors: run_offset_sd, specimen_sd, gap_sd and gap_length, merged
-            in the same way.
-        effect_priors: what the gear file says of them only, keyed `effect.parameter`;
-            the names are not checked here, the effects live on a higher floor.
-        dynamic_priors: priors of a moving gear, merged in the same way; `mass` is among
-            them only when the gear file gives it, else `mass_ratio`.
+        scale_priors: run_offset_sd, specimen_sd, gap_sd, gap_length and
+            noise_correlation.
+        effect_priors: those that the gear file states, by `effect.parameter`; the names
+            are not checked here.
+        dynamic_priors: priors of a moving gear; `mass` only where it is stated, else
+            `mass_ratio`.
         density: density of the material [N·s²/mm⁴], None where its file states none.
-        gauge_priors: priors of the gauges' gains and the thermometer's offset that a
-            certificate states: keys of `GAUGE_UNITS`.
+        gauge_priors: those of certificates, by keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
     """
 
@@ -84,7 +83,7 @@ class Gear:
 
 @dataclass(frozen=True, repr=False)
 class Case:
-    """Records of one data file on one gear, with where they came from.
+    """Records of one data file on one gear, with their source.
 
     Attributes:
         name: stem of the file, or name of the folder.
@@ -98,15 +97,13 @@ class Case:
         lots: lot of each specimen index; empty where none is stated, as the next three.
         operators: operator of each run index.
         rigs: rig of each run index.
-        dates: first one of each run index in ISO 8601, empty for a run without one.
-        left_out: specimens left out because of a faulty row, each with the finding;
-            empty unless `skip_bad` was given.
-        excluded: deformations as read whose rows were left out because the part gave
-            way, or for a working range: ends of each stretch [mm].
+        dates: first date of each run index in ISO 8601, empty for a run without one.
+        left_out: specimens left out because of a faulty row, each with the finding.
+        excluded: ends of each stretch of deformations as read whose rows were left out,
+            because the part gave way or for a working range [mm].
         excluded_sense: sign of the movement whose readings were left out, where one
             branch alone was chosen; 0 where none was.
-        screening: result for the whole record before rows were cut; None where the
-            rows are not those of a file.
+        screening: of the whole record; None where the rows are not those of a file.
         units: names and units of force and deformation; of a torsional spring they
             are a torque [N·m] and an angle [rad].
     """
@@ -137,10 +134,7 @@ class Case:
         return self._check()._repr_html_()
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the readings under the headers of hdcal's own files.
-
-        Columns that were not measured are left out.
-        """
+        """Return the readings that were measured, under hdcal's own headers."""
         import pandas as pd
 
         records = self.records
@@ -157,18 +151,8 @@ class Case:
             columns[name] = np.array(labels[name])[np.asarray(getattr(records, name))]
         return pd.DataFrame(columns)
 
-    def to_datatree(self) -> "xr.DataTree":
-        """Return the readings as xarray's DataTree, over the dimension `row`."""
-        import xarray as xr
-
-        return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
-
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the readings.
-
-        Args:
-            ax: where; by default new axes of pyplot.
-        """
+        """Draw the readings, by default into new axes of pyplot."""
         return self._check().plot(ax)
 
     def _check(self) -> Any:

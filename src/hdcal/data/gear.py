@@ -15,12 +15,7 @@ from hdcal.data.gear_file.certificates import (
     contact_as_read,
 )
 from hdcal.data.gear_file.rig_facts import rig_fact_priors
-from hdcal.data.gear_file.schema import (
-    GearFile,
-    size_findings,
-    tables_of,
-    with_reading,
-)
+from hdcal.data.gear_file.schema import GearFile, size_findings, tables_of
 from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.data.gear_file.validation import checked
 from hdcal.data.prior import Prior
@@ -41,22 +36,15 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, Findings
 
 # Shipped priors of the base model that are written for a full scale.
-IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
+_IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
 # The material of a spring that names none, and of any other gear that names none.
 NO_MATERIAL, _MATERIAL = "not stated", "steel"
 # Name in findings of a gear that no file describes.
 _IN_MEMORY = "gear"
 
 
-def unsized() -> Gear:
-    """Return a part of which nothing is known: a spring of any stiffness."""
-    return read_gear({"name": "part", "theory": SPRING})
-
-
 def read_gear(
-    source: Path | str | Mapping[str, Any],
-    theory: str | None = None,
-    reading: str | None = None,
+    source: Path | str | Mapping[str, Any], theory: str | None = None
 ) -> Gear:
     """Read a gear file, or its content as a mapping, and merge its priors.
 
@@ -72,7 +60,6 @@ def read_gear(
         source: the TOML file; or its tables as a mapping, where the names of the tables
             may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
-        reading: `radial` or `diametral`, where the file does not state it.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -82,7 +69,6 @@ def read_gear(
     else:
         path, toml = Path(source), read_toml(Path(source), str(source))
     with Findings() as wrong:
-        toml = wrong.attempt(with_reading, toml, reading) or toml
         model = wrong.attempt(checked, GearFile, toml.table, toml)
         wrong += size_findings(toml, theory)
         if theory is not None and theory not in get_args(Theory):
@@ -104,13 +90,13 @@ def _assemble(
     toml: TomlFile,
 ) -> Gear:
     sizes, measurement = model.gear, model.measurement
-    effects = {name: prior for name, prior in given.items() if "." in name}
     shipped, stated = rig_priors(), certificate_priors(measurement.certificates)
     merged = shipped | facts | stated | given
     if gauge := stated.get("deformation_offset"):
         contact = (shipped | given)["deformation_offset"]
         merged["deformation_offset"] = contact_as_read(contact, gauge)
     radial = 0.5 if measurement.deformation == "diametral" else 1.0
+    effects = {name: prior for name, prior in given.items() if "." in name}
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     of_file = sizes.theory if "K" in given else "ring"
     fact = {name: float(facts[name].numbers[0]) for name in facts}
@@ -149,18 +135,14 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
     its own size.
     """
     shipped = rig_priors()
-    own = {name: full_scale.own(shipped[name]) for name in IN_NEWTONS}
+    shipped["K"] = shipped["spring_stiffness"]
+    own = {name: full_scale.own(shipped[name]) for name in _IN_NEWTONS}
     own["force_offset"] = full_scale.own_zero(shipped["force_offset"])
-    own["K"] = full_scale.own_stiffness(shipped["spring_stiffness"])
-    sources = shipped | {"K": shipped["spring_stiffness"]}
+    own["K"] = full_scale.own_stiffness(shipped["K"])
 
     def scaled(table: dict[str, Prior]) -> dict[str, Prior]:
-        return {
-            name: own[name]
-            if name in own and prior.source == sources[name].source
-            else prior
-            for name, prior in table.items()
-        }
+        of_rig = {n for n in own.keys() & table if table[n].source == shipped[n].source}
+        return {n: own[n] if n in of_rig else prior for n, prior in table.items()}
 
     priors, scales = scaled(gear.priors), scaled(gear.scale_priors)
     return replace(gear, full_scale=full_scale, priors=priors, scale_priors=scales)
@@ -191,14 +173,14 @@ def _named_material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
     shipped = material_names()
     if name in shipped:
         return material_priors(name)
-    if not name.endswith(".toml"):
-        # A typing error only: the nearest name may be quite another steel.
-        near = get_close_matches(name, shipped, n=1, cutoff=0.85)
-        hint = f"Did you mean '{near[0]}'? " if near else ""
-        known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
-        remedy = f"{hint}{known}; for another one give the path of a .toml file"
-        raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
-    return read_material(folder / name, name)
+    if name.endswith(".toml"):
+        return read_material(folder / name, name)
+    # A typing error only: the nearest name may be quite another steel.
+    near = get_close_matches(name, shipped, n=1, cutoff=0.85)
+    hint = f"Did you mean '{near[0]}'? " if near else ""
+    known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
+    remedy = f"{hint}{known}; for another one give the path of a .toml file"
+    raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
 
 
 def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:

@@ -26,14 +26,13 @@ _RESET_STEP = 0.5
 
 @dataclass(frozen=True)
 class Motion:
-    """Movement of the deformation, row by row.
+    """Movement of the deformation, row by row, shape (n,).
 
     Attributes:
-        direction: +1 the row was reached by increasing deformation, -1 by
-            decreasing it, 0 the deformation was held; shape (n,).
-        sense: sign of the last movement, before any that of the first one,
-            +1 in a run that never moves; shape (n,).
-        rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
+        direction: +1 where the deformation increased, -1 decreased, 0 was held.
+        sense: sign of the last movement, before any that of the first one, +1 in a run
+            that never moves.
+        rate: deformation rate [mm/s], 0 on holds and without time.
         features: those present among `unloading`, `holds`, `rates`, `cycles`, and
             `holds or rates` where one of the two is.
         resets: rows reached by one step back over most of the range.
@@ -57,12 +56,7 @@ class _Move:
 
 
 def loading_side(deformation: np.ndarray) -> int:
-    """Tell on which side of the undeformed gear it was tested.
-
-    Returns:
-        +1 where it was pressed, -1 where it was pulled, 0 where both count: the
-        smaller reaches a share of the larger that counts as a movement.
-    """
+    """Return +1 for a gear that was pressed, -1 for one that was pulled, 0 for both."""
     ends = float(np.max(deformation)), float(-np.min(deformation))
     if min(ends) > _LARGE_MOVE * max(ends):
         return 0
@@ -70,11 +64,7 @@ def loading_side(deformation: np.ndarray) -> int:
 
 
 def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
-    """Tell loading, away from the undeformed gear, from unloading.
-
-    Returns:
-        +1 loading, 0 holding, -1 unloading, in compression and in tension, shape (n,).
-    """
+    """Return +1 away from the undeformed gear, 0 holding, -1 back to it, shape (n,)."""
     side = loading_side(deformation) or np.where(deformation < 0.0, -1, 1)
     return np.asarray(movement) * side
 
@@ -102,8 +92,7 @@ def derive_motion(
         deformation: in the order it was taken [mm], shape (n,).
         run: index of the mounting, shape (n,).
         time: not decreasing within a run [s], shape (n,); None when not measured.
-        hidden: whether scatter of the deformation hides how it moved; every row then
-            counts as loading, and the loading shows nothing.
+        hidden: whether scatter hides the movement: then every row counts as loading.
     """
     size = len(deformation)
     direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)

@@ -102,7 +102,6 @@ RANGES = {
     "tolerance": Range(0.0, 1e5, "mm", "from exact to a hundred metres"),
     "setting_sd": Range(0.0, 1e3, "mm", "from exact to a metre"),
     "rate": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
-    "frequency": Range(0.0, 1e9, "Hz", "from a steady sweep's start to ultrasound"),
     "duration": Range(1e-9, 1e9, "s", "from a nanosecond to thirty years"),
     "damping": Range(0.0, 1e9, "N·s/mm", "from none to as stiff as a wall"),
     # how it is computed
@@ -115,7 +114,6 @@ RANGES = {
     "jobs": Range(1, 256, "", "processes of one machine"),
     "degree": Range(1, 9, "", "higher ones leave no digits"),
     "alarm_rows": Range(10.0, 1e9, "", "less is noise, more is never"),
-    "reopen": Range(0.0, 1.0, "", "a share of the stiffness, such as 0.1"),
 }
 # Parameters, keys of files and options that are such a quantity under another name.
 NAMES = {
@@ -129,7 +127,7 @@ NAMES = {
         "gauge_range displacement_pitch",
         "force_resolution": "expanded_N",
         "deformation_sigma": "expanded_mm",
-        "share": "content confidence required_probability probability interval",
+        "share": "content confidence probability interval",
         "correlation": "noise_correlation",
         "tolerance": "tolerances",
         "rate": "rates",

@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.gear import read_gear, unsized
+from hdcal.data.gear import read_gear
 from hdcal.data.measurements.case_of import case_of
 from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME, file_of_gear
-from hdcal.data.measurements.joining import read_sheets
 from hdcal.data.measurements.measurements import of_specimen, read_measurements
 from hdcal.data.measurements.notes import ASSUMED
 from hdcal.data.measurements.screened import asked_range
-from hdcal.data.tables.arrays import NAME
-from hdcal.data.tables.sources import is_frame
+from hdcal.data.tables.sources import IN_MEMORY, is_frame
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 
@@ -37,16 +35,15 @@ def read_case(
     theory: str | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
-    reading: str | None = None,
     specimen: str | None = None,
     skip_bad: bool | None = None,
     range: str | None = None,
 ) -> Case:
-    """Read a case from a CSV file, a workbook, a folder or a table in memory.
+    """Read a case from a file, a folder or a table in memory.
 
     Args:
-        data: a CSV file or a workbook (.xlsx), or a folder holding data.csv and
-            gear.toml; or a DataFrame, or arrays by name, under the headers of such
+        data: a CSV file, workbook (.xlsx) or Parquet file, or a folder holding data.csv
+            and gear.toml; or a DataFrame, or arrays by name, under the headers of such
             files.
         gear: a gear file, or its content as a mapping, as in
             `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
@@ -57,10 +54,7 @@ def read_case(
             the gear file's table [columns].
         theory: overrides the gear file's theory.
         encoding: encoding of a CSV file; by default the likeliest.
-        sheet: sheet of a workbook (.xlsx); by default the one with readings. With an
-            asterisk, as in ``Probe*``, it stands for several, each a specimen.
-        reading: `radial` or `diametral` deformation, where the gear file is
-            silent; by default it is taken for radial, and a note says so.
+        sheet: sheet of a workbook; by default the one with readings.
         specimen: label of the one whose rows are wanted; by default all of them.
         skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
@@ -74,7 +68,7 @@ def read_case(
     """
     columns, in_memory = asked_columns(data, columns)
     asked_range(range)
-    path = Path(NAME if in_memory else data)
+    path = Path(IN_MEMORY if in_memory else data)
     # Of a folder with a file for each gear, the one that is called after it.
     own = path if in_memory else file_of_gear(path, specimen)
     # As `is_dir`, but a path that no system takes is no folder.
@@ -84,16 +78,11 @@ def read_case(
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
-        how_read = (theory, reading)
-        described = of_gear.attempt(gear_of, gear, nearby, folder, how_read)
+        described = of_gear.attempt(gear_of, gear, nearby, folder, theory)
         known = None if described is None else described[0]
         named = columns if known is None else known.source.get("columns", {}) | columns
-        if sheet is not None and "*" in sheet:
-            asked = (table, named, sheet, known, skip_bad)
-            measured = wrong.attempt(read_sheets, *asked)
-        else:
-            how: dict = {"sheet": sheet, "gear": known, "skip_bad": skip_bad}
-            measured = wrong.attempt(read_measurements, table, named, encoding, **how)
+        how: dict = {"sheet": sheet, "gear": known, "skip_bad": skip_bad}
+        measured = wrong.attempt(read_measurements, table, named, encoding, **how)
         wrong += of_gear
         alone = own != path and measured is not None and len(measured.gears[1]) == 1
         if measured is not None and specimen is not None and not alone:
@@ -121,7 +110,7 @@ def asked_columns(
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
     """Return the name of the case, or of its folder, after file and parts."""
     name = (data.resolve().name if folder else data.stem) or "case"
-    texts = (str(part).replace("*", "").strip() for part in parts if part is not None)
+    texts = (str(part).strip() for part in parts if part is not None)
     return "-".join([name, *(_NO_NAME.sub("_", text) for text in texts)])
 
 
@@ -129,41 +118,35 @@ def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     nearby: Path | None,
     folder: bool,
-    asked: tuple[str | None, str | None],
+    theory: str | None,
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and notes on its source.
 
-    A gear file may be at the place `nearby`, and must be there in a folder. What is
-    asked are theory and reading, as in `read_case`.
+    A gear file may be at the place `nearby`, and must be there in a folder.
     """
-    theory, reading = asked
-    notes = [f"the deformation is {reading}, as requested"] if reading else []
+    notes = []
     if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
         gear = nearby
         notes += [] if folder else [_NEARBY]
     if gear is not None:
-        known = read_gear(gear, *asked)
+        known = read_gear(gear, theory)
         return known, (*_defaults(known), *notes)
-    if theory not in (None, SPRING) or reading is not None:
+    if theory not in (None, SPRING):
         words = "this needs sizes, and there is no gear file"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
-    return unsized(), (UNSIZED,)
-
-
-def leaves_reading_open(gear: Gear) -> bool:
-    """Tell whether K depends on radial or diametral, and the gear file is silent."""
-    measurement = gear.source.get("measurement", {})
-    return gear.theory != SPRING and "deformation" not in measurement
+    return read_gear({"name": "part", "theory": SPRING}), (UNSIZED,)
 
 
 def _defaults(gear: Gear) -> Iterator[str]:
     """Yield defaults that the gear file leaves and on which much depends."""
-    if leaves_reading_open(gear):
+    if gear.theory == SPRING:
+        return
+    if "deformation" not in gear.source.get("measurement", {}):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
             "twice as large, state that in the gear file"
         )
-    if gear.theory != SPRING and "material" not in gear.source.get("gear", {}):
+    if "material" not in gear.source.get("gear", {}):
         yield (
             f"{ASSUMED}the gear is of steel. If not, which changes K and the influence "
             "of the temperature, name its material in the gear file"

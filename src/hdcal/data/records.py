@@ -18,7 +18,7 @@ Array = jax.Array | np.ndarray
 
 
 class _InDoublePrecision(eqx.Module):
-    """What computations begin with, made here or sent by another process."""
+    """Inputs of computations; making one switches JAX to double precision."""
 
     def __post_init__(self) -> None:
         use_double_precision(self)
@@ -29,9 +29,7 @@ class _InDoublePrecision(eqx.Module):
 
 
 class Geometry(_InDoublePrecision):
-    """Size of the flexspline; every leaf may be differentiated.
-
-    A spring has none: all are NaN. Making one switches JAX to double precision.
+    """Size of the flexspline; every leaf may be differentiated; NaN of a spring.
 
     Attributes:
         wall_thickness: δ [mm].
@@ -50,8 +48,6 @@ class Geometry(_InDoublePrecision):
 
 class Records(_InDoublePrecision):
     """Rows in the order they were taken; absent covariates hold neutral values.
-
-    Making one switches JAX to double precision.
 
     Attributes:
         deformation: as read [mm], radial or diametral by the gear file.

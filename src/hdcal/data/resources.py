@@ -10,31 +10,18 @@ _PAGE_FOLDERS = ("howto", "reference", "validation", "reference/effects")
 
 
 def priors_folder() -> Traversable:
-    """Return the folder of the prior tables: the rig's, the effects' and materials.
-
-    Raises:
-        FileNotFoundError: the installation carries no prior tables.
-    """
+    """Return the folder of the prior tables: the rig's, the effects' and materials'."""
     return _shipped("priors")
 
 
 def datasets_folder() -> Traversable:
-    """Return the folder of the example data sets, one subfolder each.
-
-    Raises:
-        FileNotFoundError: the installation carries no data sets.
-    """
+    """Return the folder of the example data sets, one subfolder each."""
     return _shipped("datasets")
 
 
 def pages() -> dict[str, Traversable]:
-    """Return the pages of the documentation by their names, how-tos first.
-
-    Raises:
-        FileNotFoundError: the installation carries none.
-    """
-    root = _shipped("docs")
-    found: dict[str, Traversable] = {}
+    """Return the pages of the documentation by their names, how-tos first."""
+    root, found = _shipped("docs"), {}
     for folder in _PAGE_FOLDERS:
         for page in sorted((root / folder).iterdir(), key=lambda page: page.name):
             name, dot, kind = page.name.rpartition(".")
@@ -44,6 +31,11 @@ def pages() -> dict[str, Traversable]:
 
 
 def _shipped(name: str) -> Traversable:
+    """Return a folder of the installed package, or of a checkout.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
     # pathlib.Path and zipfile.Path both know their parent; Traversable does not.
     data: Any = files("hdcal.data")
     package = data.parent

@@ -26,20 +26,10 @@ def require_scatter(case: Case) -> None:
         return
     if np.max(np.abs(left_of_lines(records, force))) > _NOTHING * np.max(np.abs(force)):
         return
-    words = (
-        f"the {case.units.load}s lie on a straight line to the last digit, so "
-        "their scatter cannot be estimated"
-    )
-    members = len(np.unique(records.run)) + len(case.specimen_labels)
-    if len(force) <= members:
-        words = (
-            "the scatter of the readings cannot be estimated: each run has no more "
-            "readings than its line and its zero need"
-        )
-    remedy = "To readings that were computed, add noise"
-    if case.units.is_force:
-        remedy += ", or say the step of the display as force_resolution_N under "
-        remedy += "[measurement] of the gear file"
+    words = "the scatter of the readings cannot be estimated: each run lies on a "
+    words += "straight line to the last digit"
+    remedy = "To readings that were computed, add noise; of a display, state the step "
+    remedy += "as force_resolution_N under [measurement] of the gear file"
     raise InputError([Finding(case.name, words, remedy)])
 
 

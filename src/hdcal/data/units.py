@@ -147,9 +147,7 @@ def unit_names(dimension: str) -> list[str]:
 
 
 def to_code(unit: str) -> tuple[float, str]:
-    """Read a unit such as `GPa`, `1e-4/K` or `N*s/mm^2`.
-
-    A degree is a difference here, never a point on the scale.
+    """Read a unit such as `GPa`, `1e-4/K` or `N*s/mm^2`; a degree is a difference.
 
     Returns:
         The factor that takes a number in `unit` to code units, and the name of
@@ -170,17 +168,13 @@ def to_code(unit: str) -> tuple[float, str]:
 
 
 def unit_powers(unit: str) -> tuple[int, ...]:
-    """Return the powers of N, mm, s and K in a unit.
-
-    Raises:
-        UnitError: as `to_code`.
-    """
+    """Return the powers of N, mm, s and K in a unit, as `to_code` reads it."""
     return _product(unit)[1]
 
 
 @cache
 def _product(unit: str) -> tuple[float, tuple[int, ...]]:
-    """Scale of a product of units, and its powers of the code units."""
+    """Return the scale of a product of units, and its powers of the code units."""
     if len(unit) > _LONGEST:
         raise UnitError("the unit is longer than any unit can be")
     factor, powers, sign = 1.0, _NONE, 1

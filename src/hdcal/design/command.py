@@ -48,43 +48,65 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
     return source
 
 
-@command(short_help="Wave generator for a window, or sizes for a limit.")
+@command(short_help="Design a wave generator, or sizes for a limit.")
 @options.start_options
 @click.option(
-    "--window", type=ENDS, help="Deformation to keep [mm]: asks for a spring."
+    "--window",
+    type=ENDS,
+    help="Design a spring that keeps the deformation in this range [mm].",
 )
 @click.option(
-    "--setting-sd", type=LENGTH, default=0.0, help="Scatter of its set point."
+    "--setting-sd",
+    type=LENGTH,
+    default=0.0,
+    help="Set the standard deviation of the set point [mm].",
 )
-@click.option("--spring-rate", "rates", type=ENDS, help="Rates to consider [N/mm].")
-@click.option("--limit-force", type=FORCE, help="Not to be exceeded: asks for sizes.")
-@click.option("--limit-stress", type=STRESS, help="[default: the yield strength]")
-@click.option("--deformation", type=LENGTH, help="Of the limit [default: nominal].")
+@click.option(
+    "--spring-rate",
+    "rates",
+    type=ENDS,
+    help="Consider spring rates in this range [N/mm].",
+)
+@click.option(
+    "--limit-force", type=FORCE, help="Design sizes that keep the force below this [N]."
+)
+@click.option(
+    "--limit-stress",
+    type=STRESS,
+    help="Keep the stress below this [MPa] [default: the yield strength].",
+)
+@click.option(
+    "--deformation",
+    type=LENGTH,
+    help="Apply the limit at this deformation [mm] [default: nominal].",
+)
 @options.repeated_option(
     "--vary",
     metavar="SIZE_mm=LO:HI",
     read=partial(read_named, read=read_ends, known=lambda: SIZE_NAMES),
-    help="A size that may change: wall_thickness_mm=0.5:0.8; may be repeated.",
+    help="Vary a size in a range: wall_thickness_mm=0.5:0.8. May be repeated.",
 )
-@options.material_option("Materials to choose among [default: the gear's].")
+@options.material_option("Choose among materials [default: that of the gear].")
 @click.option(
     "--temperature",
     "temperatures",
     type=Parsed("LO:HI", read_window),
-    help="Temperatures at which it has to hold [°C] [default: the reference one].",
+    help="Require it at these temperatures [°C] [default: the reference temperature].",
 )
-@click.option("--probability", default=0.99, help="To hold with [default: 0.99].")
+@click.option(
+    "--probability", default=0.99, help="Require this probability [default: 0.99]."
+)
 @options.tolerance_option
 @options.seed_option
-@options.folder_options("Result folder [default: NAME-design].")
+@options.folder_options("Write the result to DIR [default: NAME-design].")
 @options.json_option
 @click.pass_obj
 def design(console: Console, run, gear, out, force, **given):
-    """Design from RUN, a folder of `hdcal calibrate`.
+    """Design from RUN, a result folder of `hdcal calibrate`.
 
-    With --window: the softest spring of an elastic wave generator that keeps the gear
-    inside, without backlash beyond its end nearer to zero and jam beyond the other.
-    With --limit-force: the sizes nearest to the tested ones that keep it.
+    --window designs the softest spring of an elastic wave generator that keeps the
+    gear between backlash, at the end nearer to zero, and jamming, at the other end.
+    --limit-force designs the sizes nearest to the tested ones that keep the limit.
     """
     from hdcal.design.inverse_design import inverse_design
     from hdcal.design.wave_generator import wave_generator
@@ -104,26 +126,34 @@ def design(console: Console, run, gear, out, force, **given):
     return console.show(answer(source, **asked), answer="design.json")
 
 
-@command(short_help="Force over sizes and materials, with bands.")
+@command(short_help="Compute the force over sizes and materials.")
 @options.start_options
 @options.repeated_option(
     "--vary",
     metavar="NAME=VALUES",
     read=partial(read_named, read=read_grid, known=lambda: AXES),
-    help="wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45; may be repeated. Also "
-    "length_mm, load_height_mm, deformation_mm, temperature_C.",
+    help="Vary wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45. May be repeated. "
+    "Also length_mm, load_height_mm, deformation_mm, temperature_C.",
 )
-@options.material_option("Materials to compare [default: the gear's].")
-@click.option("--deformation", type=LENGTH, help="Radial [default: nominal].")
-@click.option("--temperature", type=float, help="[°C] [default: the reference one]")
+@options.material_option("Compare materials [default: that of the gear].")
+@click.option(
+    "--deformation",
+    type=LENGTH,
+    help="Use this radial deformation [mm] [default: nominal].",
+)
+@click.option(
+    "--temperature",
+    type=float,
+    help="Use this temperature [°C] [default: the reference temperature].",
+)
 @options.seed_option
-@options.folder_options("Result folder [default: NAME-study].")
+@options.folder_options("Write the result to DIR [default: NAME-study].")
 @options.json_option
 @click.pass_obj
 def study(console: Console, run, gear, out, force, **asked):
-    """Compute the force for every combination of sizes, from RUN.
+    """Compute the force for every combination of sizes from RUN.
 
-    RUN is a folder of `hdcal calibrate`.
+    RUN is a result folder of `hdcal calibrate`.
     """
     from hdcal.design.study import study as run_study
 

@@ -37,11 +37,8 @@ def classes(
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
     all that the readings do not exclude given it and whose curves, each fitted alone,
-    coincide with it. An effect is in one class at most.
-
-    Args:
-        searched: hypotheses of the case.
-        posterior: probability of each, by model of the noise.
+    coincide with it. An effect is in one class at most. `posterior` is the probability
+    of each hypothesis, by model of the noise.
     """
     chance = dict.fromkeys(searched.table.names[:-1], 0.0)
     for key, each in posterior.items():
@@ -72,11 +69,11 @@ def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, "
     has no evidence.
     """
     table, problem = searched.table, searched.problem
-    parts = table.parts.get(key)
-    if parts is None:
+    parts = table.parts.get(key, [])
+    names = [table.names[part.component] for part in parts]
+    if name not in names:
         return np.zeros(len(problem.y))
     curves = mean_curves(problem, table.likeliest_noise(key), parts)
-    names = [table.names[part.component] for part in parts]
     curve = curves[names.index(name)]
     return curve / max(float(np.linalg.norm(curve)), 1e-300)
 
@@ -125,20 +122,16 @@ def acting(
 ) -> list[Acting]:
     """Return the components that act in each hypothesis and noise model.
 
-    Args:
-        searched: hypotheses of the case.
-        posterior: probability of each, by model of the noise.
-        class_of: name of the class of each effect that has one.
-        rng: source of randomness.
+    `posterior` is the probability of each hypothesis, by model of the noise; `class_of`
+    the name of the class of each effect that has one.
     """
     table, found = searched.table, []
     for key, chance in posterior.items():
         by_noise: dict[str, float] = defaultdict(float)
         for noise, each in zip(table.noises, chance, strict=True):
             by_noise[noise.name] += float(each)
-        drawn: list[Acting] = []
-        if key and max(by_noise.values()) >= NEGLIGIBLE:
-            drawn = [*_drawn(searched, key, class_of, rng)]
+        probable = bool(key) and max(by_noise.values()) >= NEGLIGIBLE
+        drawn = [*_drawn(searched, key, class_of, rng)] if probable else []
         whole = [Acting(1.0, key, "", {}, np.ones(1), np.zeros(0))]
         for name, weight in by_noise.items():
             for each in drawn if weight >= NEGLIGIBLE and drawn else whole:
@@ -193,10 +186,6 @@ def share_closed(
 
     At their best amplitudes, which are not negative: a curve that points away from the
     gap closes nothing.
-
-    Args:
-        gap: of each draw.
-        curves: none, one or two of each draw.
     """
     if not len(curves):
         return np.zeros(len(gap))

@@ -44,8 +44,7 @@ class Decision:
         explanations: all that are possible, the most probable first.
         hypotheses: probability of each hypothesis on the mean reading and effect on
             the noise.
-        coarse_step: step of forces that are read coarsely [N], a fact of the reading
-            and no hypothesis; 0 where they are not.
+        coarse_step: step of forces that are read coarsely [N]; 0 where they are not.
     """
 
     gap: float
@@ -63,13 +62,9 @@ def decide(
     temperature: float = TEMPERATURE,
     seed: int = 0,
 ) -> Decision:
-    """Decide what acts in a case.
+    """Decide what acts in a case, of effects by name.
 
-    Args:
-        case: gear and records.
-        library: effects to consider, by name.
-        temperature: by which log evidences are divided.
-        seed: of the random numbers.
+    Log evidences are divided by the temperature.
 
     Raises:
         InputError: an effect has no prior.
@@ -86,8 +81,7 @@ def decide_searched(
     groups = classes(searched, chance)
     class_of = {name: group[0] for group in groups for name in group}
     found = acting(searched, chance, class_of, rng)
-    predicting = searched.predicting
-    on_noise = [name for name in ON_NOISE if name in predicting.effects]
+    on_noise = [name for name in ON_NOISE if name in searched.effects]
     groups += [(name,) for name in on_noise]
     causes = [_cause(members, found) for members in groups]
     causes.sort(key=lambda each: -each.probability)
@@ -107,7 +101,7 @@ def decide_searched(
         inclusion={name: _cause((name,), found).probability for name in names},
         fits=p_value >= ADEQUATE,
         p_value=p_value,
-        not_testable={n: tuple(each) for n, each in predicting.lacking.items()},
+        not_testable=dict(searched.lacking),
     )
     return Decision(
         gap=gap,
@@ -122,14 +116,7 @@ def decide_searched(
 def _verdict(
     causes: Sequence[Cause], outside: Cause, gap: float, *, fits: bool
 ) -> VerdictWord:
-    """Return the answer in a word.
-
-    Args:
-        causes: classes, the most probable first.
-        outside: something outside the library.
-        gap: probability that something acts.
-        fits: whether the likeliest explanation fits.
-    """
+    """Return the answer in a word; classes come with the most probable first."""
     if gap <= LIKELY:
         return "none"
     likely = [cause for cause in causes if cause.probability > LIKELY]
@@ -207,11 +194,6 @@ def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -
     A posterior predictive check. Structure is the largest of the shares of the
     residuals that the kernels of the remainder span, each in sds of what noise makes
     it.
-
-    Args:
-        searched: hypotheses of the case.
-        key: the hypothesis.
-        rng: source of randomness.
     """
     problem, noise = searched.problem, searched.table.likeliest_noise(key)
     if not searched.kernels:

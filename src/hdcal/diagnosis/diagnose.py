@@ -18,19 +18,13 @@ from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate
-from hdcal.diagnosis.result import (
-    Data,
-    Diagnosis,
-    Gap,
-    HowFar,
-    Refit,
-    Rung,
-)
+from hdcal.diagnosis.result import Data, Diagnosis, Gap, HowFar, Refit, Rung
 from hdcal.diagnosis.which import LIKELY, effect_words
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.noise_models import OUTLIERS
 from hdcal.evidence.search import Searched, search
 from hdcal.evidence.table import OUTSIDE
+from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
@@ -73,7 +67,7 @@ def diagnose(
     posterior = searched.table.posterior(TEMPERATURE)
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
-    calibrated, fits = case, Refits({}, None, {})
+    calibrated, fits = case, Refits({}, None, ())
     if not quick:
         calibrated = rows_to_calibrate(case)
         fits = refit(calibrated, found.hypotheses, effects, seed, progress)
@@ -93,7 +87,7 @@ def diagnose(
         left_out=fits.left_out,
         stiffness_N_per_mm=_stiffness(fits),
         reasons=() if fits.posteriors else fits.failures,
-        coarse_step_N=found.coarse_step,
+        coarse_step_N=searched.coarse_step,
         library=tuple(effects),
         seed=seed,
         versions=versions(),
@@ -163,7 +157,7 @@ def _how_far(
 ) -> HowFar:
     closed, word = None, ""
     if names:
-        closed, word = closed_on_left_out(searched, fit.noise, fit.noise_sd, names, rng)
+        closed, word = closed_on_left_out(searched, fit, names, rng)
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():
         if name != OUTSIDE or len(fit.rms) > 1:
@@ -178,11 +172,9 @@ def _how_far(
 
 def _formula(case: Case, searched: Searched) -> Rung:
     """Return what the formula itself leaves: K = 1, no offset."""
-    records, reading = searched.problem.records, searched.problem.reading
-    modulus = case.gear.priors["E0"].numbers[0]
-    stiffness = float(THEORIES[case.gear.theory](case.gear.geometry, modulus))
-    rise = np.asarray(records.temperature) - reading.reference_temperature
-    soft = 1.0 - float(searched.problem.base.alpha) * rise
-    radial = np.asarray(records.deformation) * reading.radial_per_read
-    left = np.asarray(records.force) - stiffness * soft * radial
+    gear, problem = case.gear, searched.problem
+    stiffness = THEORIES[gear.theory](gear.geometry, gear.priors["E0"].numbers[0])
+    base = Base(float(stiffness), problem.base.alpha, 0.0, 0.0, 1.0)
+    force = predict_reading(base, (), problem.records, problem.reading)[0]
+    left = np.asarray(problem.records.force) - np.asarray(force)
     return Rung(model=FORMULA, rms_N=float(np.sqrt(np.mean(left**2))))

@@ -61,13 +61,7 @@ def gap_by_row(
     posterior_of: Mapping[Names, np.ndarray],
     rng: np.random.Generator,
 ) -> GapByRow:
-    """Return residuals and posterior draws of the gap.
-
-    Args:
-        searched: hypotheses of the case.
-        posterior_of: probability of each, by model of the noise.
-        rng: source of randomness.
-    """
+    """Return residuals and posterior draws of the gap, over all hypotheses."""
     problem, table = searched.problem, searched.table
     keys = [*posterior_of]
     chance = np.array([posterior_of[key].sum() for key in keys])
@@ -85,16 +79,12 @@ def gap_by_row(
 
 
 def fitted(
-    searched: Searched,
-    posterior_of: Mapping[Names, np.ndarray],
-    names: Sequence[str],
+    searched: Searched, posterior_of: Mapping[Names, np.ndarray], names: Sequence[str]
 ) -> Fitted:
     """Return the likeliest of the hypotheses that contain most of some effects.
 
-    Args:
-        searched: hypotheses of the case.
-        posterior_of: probability of each, by model of the noise.
-        names: of the effects on the mean reading; a hypothesis contains two at most.
+    `names` are those of the effects on the mean reading; a hypothesis contains two at
+    most.
     """
     problem, table = searched.problem, searched.table
     key = max(
@@ -118,37 +108,25 @@ def fitted(
 
 
 def closed_on_left_out(
-    searched: Searched,
-    noise: NoiseModel,
-    noise_sd: float,
-    names: Sequence[str],
-    rng: np.random.Generator,
+    searched: Searched, fit: Fitted, names: Sequence[str], rng: np.random.Generator
 ) -> tuple[Interval | None, str]:
     """Return the share of the gap that effects close on rows left out of the fit.
 
     The rows are left out block by block: half cycles, or stretches where there are few.
-    Base model and effects are fitted to the others, the shapes of the effects included.
-    The share is 1 − √(G₁/G₀), G the mean square of what is left beyond the noise.
-
-    Args:
-        searched: hypotheses of the case.
-        noise: model of the noise.
-        noise_sd: of a typical row [N].
-        names: effects that are added together.
-        rng: source of randomness.
+    Base model and effects are fitted to the others, the shapes of the effects included,
+    with the noise of a fit to all. The share is 1 − √(G₁/G₀), G the mean square of what
+    is left beyond the noise.
 
     Returns:
         Median and interval over resampled blocks and the error of the noise sd, None
         where no block shows a gap; and what was left out.
     """
     problem = searched.problem
-    effects = {name: searched.predicting.effects[name] for name in names}
+    effects = {name: searched.effects[name] for name in names}
     members = any(issubclass(effect, Scatter) for effect in effects.values())
     block, word = _blocks(problem, by_member=members)
     library, count = components(effects, problem), int(block.max()) + 1
-    table = np.array(
-        [_errors(problem, library, noise, noise_sd, block == k) for k in range(count)]
-    )
+    table = np.array([_errors(problem, library, fit, block == k) for k in range(count)])
     rows = np.bincount(block).astype(float)
     picked = rng.multinomial(count, np.full(count, 1.0 / count), _SAMPLES)
     before, after, spread = (picked * rows @ table / (picked @ rows)[:, None]).T
@@ -178,15 +156,10 @@ def _closed(before, after):
 def _blocks(
     problem: LinearProblem, *, by_member: bool
 ) -> tuple[Int[np.ndarray, " n"], str]:
-    """Return the block of each row, and the word for a block.
-
-    Args:
-        problem: the case.
-        by_member: whether members differ. Nothing predicts a member without any row of
-            it, so that a block is a quarter of each.
-    """
+    """Return the block of each row, and the word for a block."""
     records = problem.records
     if by_member:
+        # Nothing predicts a member without any row of it.
         quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
         return quarter.astype(int), "a quarter of each run"
     word = "a half cycle" if "unloading" in records.known else "a stretch of rows"
@@ -201,8 +174,7 @@ def _blocks(
 def _errors(
     problem: LinearProblem,
     library: Components,
-    noise: NoiseModel,
-    noise_sd: float,
+    fit: Fitted,
     left_out: Bool[np.ndarray, " n"],
 ) -> Float[np.ndarray, " 3"]:
     """Return mean squared errors on some rows of models that were fitted without them.
@@ -210,9 +182,9 @@ def _errors(
     In noise variances of a row: the base model's, less the noise and less the variance
     of the prediction; the same with the effects; and the variance of that prediction.
     """
-    rest = problem.without(left_out)
+    noise, rest = fit.noise, problem.without(left_out)
     others = noise._replace(weight=np.where(left_out, 0.0, noise.weight))
-    weight = noise.weight[left_out] / noise_sd
+    weight = noise.weight[left_out] / fit.noise_sd
 
     def error(parts: Sequence[Part]) -> tuple[float, float]:
         found = posterior(rest, others, parts)

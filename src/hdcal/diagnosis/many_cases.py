@@ -12,7 +12,7 @@ from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
 from hdcal.data.reading import read_case
-from hdcal.errors import Finding, Findings, HdcalError, InputError
+from hdcal.errors import Finding, HdcalError, InputError
 from hdcal.report.item import Item
 from hdcal.report.result import Result
 from hdcal.report.saving import MARKER
@@ -72,30 +72,22 @@ def read_cases(paths: Sequence[str], **reading) -> tuple[list[Case], Refused]:
     found: dict[str, Case] = {}
     refused: dict[str, tuple[Finding, ...]] = {}
     for path in paths:
-        wrong = Findings()
         try:
-            case = wrong.attempt(_read, path, **reading)
-        except Exception as error:
-            case = wrong.append(_defect(path, error, alone=len(paths) == 1))
-        # Some file systems do not distinguish capitals.
-        name = "" if case is None else case.name.casefold()
-        taken = (*found, MARKER, REFUSED) if len(paths) > 1 else ()
-        if name in taken:
-            words = f"its result '{name}' would have the name of another file"
-            wrong.append(Finding(path, words, "Rename it, or diagnose it alone"))
-        if wrong:
-            refused[path] = (*refused.get(path, ()), *wrong)
-        elif case is not None:
+            case = read_case(path, **reading)
+            check_effect_priors(case)
+            # Some file systems do not distinguish capitals.
+            name = case.name.casefold()
+            if len(paths) > 1 and name in (*found, MARKER, REFUSED):
+                words = f"its result '{name}' would have the name of another file"
+                remedy = "Rename it, or diagnose it alone"
+                raise InputError([Finding(path, words, remedy)])
             found[name] = case
+        except Exception as error:
+            wrong = _wrong(path, error, alone=len(paths) == 1)
+            refused[path] = (*refused.get(path, ()), *wrong)
     if not found:
         raise InputError(all_findings(refused))
     return [*found.values()], refused
-
-
-def _read(path: str, **reading) -> Case:
-    case = read_case(path, **reading)
-    check_effect_priors(case)
-    return case
 
 
 def all_findings(refused: Refused) -> list[Finding]:
@@ -123,14 +115,13 @@ def diagnose_many(
         outcomes = run_all(partial(_diagnosed, **how), tasks, jobs, progress)
     by_name = {each.name: out for each, out in zip(cases, outcomes, strict=True)}
     found = {n: out for n, out in by_name.items() if isinstance(out[0], Row)}
-    wrong = {n: out for n, out in by_name.items() if n not in found}
-    refused = {**refused, **wrong}
+    refused = {**refused, **{n: o for n, o in by_name.items() if n not in found}}
     if not found:
         raise InputError(all_findings(refused))
-    failed = [n for n, (row, _) in found.items() if row.verdict == "FAILED"]
+    rows = tuple(row for row, _ in found.values())
     together = Diagnoses(
-        reasons=tuple(f"{name}: failed" for name in failed),
-        rows=tuple(row for row, _ in found.values()),
+        reasons=tuple(f"{r.case}: failed" for r in rows if r.verdict == "FAILED"),
+        rows=rows,
         cases={name: plain for name, (_, plain) in found.items()},
         refused=refused,
     )
@@ -142,10 +133,8 @@ def _diagnosed(case: Case, place: Path, **how) -> tuple:
     """Return row and verdict.json of a case, or what is wrong with it."""
     try:
         found = diagnose_into(place, case, **how)
-    except InputError as error:
-        return error.findings
     except Exception as error:
-        return (_defect(case.name, error),)
+        return _wrong(case.name, error)
     which, closed = found.which, found.how_far.closed
     leading = next((c for c in which.causes if c.explains), which.outside)
     row = Row(
@@ -205,16 +194,17 @@ def diagnose_into(
     return found
 
 
-def _defect(name: str, error: Exception, *, alone: bool = False) -> Finding:
-    """Return a finding on a defect of hdcal, so that other cases continue.
+def _wrong(name: str, error: Exception, *, alone: bool = False) -> tuple[Finding, ...]:
+    """Return what is wrong with a case: bad input, or a defect of hdcal.
 
     Raises:
-        Exception: that is no defect, or there is no other case, or the traceback is
-            wanted.
+        Exception: the error, unless other cases can continue without it.
     """
-    if isinstance(error, HdcalError | OSError):
-        raise error
-    if alone or os.environ.get("HDCAL_DEBUG") == "1":
+    if isinstance(error, InputError):
+        return tuple(error.findings)
+    debug = os.environ.get("HDCAL_DEBUG") == "1"
+    if alone or debug or isinstance(error, HdcalError | OSError):
         raise error
     words = f"internal error ({type(error).__name__}: {error})"
-    return Finding(name, words, "Please report it, with what HDCAL_DEBUG=1 prints")
+    remedy = "Please report it, with what HDCAL_DEBUG=1 prints"
+    return (Finding(name, words, remedy),)

@@ -1,12 +1,13 @@
-"""Which run gives most information about the cause.
+"""Suggested runs, ranked by their information about the cause for their effort.
 
-The information of a run about which hypothesis is true is that between the index of the
-hypothesis and its Gaussian predictive [nat]. A remainder outside the library predicts
-nothing and is left out.
+The information of a run is that between the index of the true hypothesis and its
+Gaussian predictive [nat]. A remainder outside the library predicts nothing and is left
+out.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -14,13 +15,18 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Records
-from hdcal.diagnosis.candidate_runs import ROWS, candidate_runs
 from hdcal.evidence.base_model import base_columns
-from hdcal.evidence.parts import Part, coefficients, posterior
+from hdcal.evidence.effect_curves import effect_curves, padded_records
+from hdcal.evidence.parts import LinearPosterior, Part, coefficients, posterior
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
 from hdcal.report.item import EffectName, Item, Words
 
+# Rows of every suggested run. Seconds between rows where no time was measured, and
+# those of a hold in all.
+_ROWS, _PACE, _HOLD = 32, 5.0, 60.0
+# Changes of temperature [°C] that are suggested, and that count as one.
+_WARMER, _SAME = 30.0, 5.0
 # Hypotheses that take part, draws of each, and the least that is worth a run.
 _MOST, _DRAWS, _LEAST_NATS, _LEAST_SHARE = 6, 256, 0.02, 0.01
 
@@ -41,16 +47,111 @@ class NextRun(Item):
     cost: str
 
 
-class _Readings(NamedTuple):
-    """Normal readings of runs under each hypothesis.
+class Candidate(NamedTuple):
+    """A run in words, its cost, its effort over that of a ramp, and its rows."""
 
-    Attributes:
-        mean: shape (r, h, m) [N].
-        covariance: shape (r, h, m, m).
+    words: str
+    cost: str
+    effort: float
+    records: Records
+
+
+def candidate_runs(
+    records: Records, reference_temperature: float
+) -> Iterator[Candidate]:
+    """Yield runs that show what the measured ones cannot.
+
+    Args:
+        records: what was measured, run after run.
+        reference_temperature: T_ref of the gear [°C].
     """
+    known, paths, pace = records.known, _paths(records), _pace(records)
+    warmth = np.asarray(records.temperature)
+    first, last = float(warmth[0]), float(warmth[-1])
+    near = abs(last - reference_temperature) < 0.5 * _WARMER
+    other = last + _WARMER if near else reference_temperature
 
-    mean: Float[np.ndarray, "*r h m"]
-    covariance: Float[np.ndarray, "*r h m m"]
+    def run(words, cost, effort, path, pace=pace, **columns):
+        return Candidate(words, cost, effort, _run(records, path, pace, **columns))
+
+    loop, one, mounting = paths["loop"], "one cycle", "one mounting"
+    if "unloading" not in known:
+        yield run("load and unload at the same rate", one, 1.5, loop)
+    timed = "time" in known
+    if timed and "rates" not in known:
+        yield run("load and unload four times faster", one, 1.5, loop, pace / 4.0)
+        slow = "load and unload ten times slower", "one slow cycle", 4.0
+        yield run(*slow, loop, 10.0 * pace)
+    if timed and "holds" not in known:
+        words = "load, then hold the top for a minute"
+        yield run(words, "two minutes", 2.0, paths["hold"])
+    if np.ptp(warmth) <= _SAME:
+        words = f"load and unload at {other:.0f} °C"
+        yield run(words, "one change of temperature", 6.0, loop, temperature=other)
+    elif abs(first - last) > _SAME:
+        words = f"go back to the first temperature, {first:.0f} °C, and load again"
+        yield run(words, "one change of temperature", 6.0, loop, temperature=first)
+    words = "re-seat the gear and load again in finer steps at small {displacement}s"
+    yield run(words, mounting, 2.0, paths["fine"])
+    words = "small loops between half and 0.7 of the top"
+    yield run(words, one, 1.5, paths["inner"])
+    words = "load to 1.25 of the tested {displacement}"
+    yield run(words, "one run beyond the tested range", 5.0, paths["beyond"])
+    if np.ptp(records.angle) == 0.0:
+        angle = float(records.angle[-1]) + np.pi / 2.0
+        words = "turn the gear by 90° and load again"
+        yield run(words, mounting, 2.0, paths["up"], angle=angle)
+    if "specimens" not in known:
+        words, gear = "load a second gear of the same kind", int(records.specimen[0])
+        yield run(words, "one gear", 8.0, paths["up"], specimen=gear + 1)
+
+
+def _paths(records: Records) -> dict[str, np.ndarray]:
+    """Return deformations [mm] by name, of `_ROWS` rows each."""
+    low, top = float(np.min(records.deformation)), float(np.max(records.deformation))
+    # Both signs are loads.
+    low, top = (low, top) if abs(top) >= abs(low) else (top, low)
+    up = np.linspace(low, top, _ROWS)
+    small = np.linspace(0.5, 0.7, _ROWS // 4) * top
+    return {
+        "up": up,
+        "loop": np.concatenate([up[::2], up[::-2]]),
+        "fine": low + (top - low) * np.linspace(0.0, 1.0, _ROWS) ** 2,
+        "inner": np.concatenate([small, small[::-1], small, small[::-1]]),
+        "hold": np.concatenate([up[::2], np.full(_ROWS // 2, top)]),
+        "beyond": 1.25 * up,
+    }
+
+
+def _pace(records: Records) -> float:
+    """Return the usual seconds between rows of the last run."""
+    steps = np.diff(np.asarray(records.time)[records.run == records.run[-1]])
+    steps = steps[steps > 0.0]
+    measured = "time" in records.known and steps.size
+    return float(np.median(steps)) if measured else _PACE
+
+
+def _run(records: Records, path, pace: float, **columns) -> Records:
+    """Return a run along a path; what is not given stays as in the last row."""
+    step = np.diff(path, prepend=2.0 * path[0] - path[1])
+    direction = np.sign(step)
+    moving = np.maximum.accumulate(np.where(direction, np.arange(len(path)), 0))
+    held = direction == 0.0
+    hold = _HOLD / max(np.count_nonzero(held), 1)
+    names = "temperature", "angle", "specimen"
+    last = {name: np.asarray(getattr(records, name))[-1] for name in names}
+    return replace(
+        records,
+        deformation=path,
+        time=np.cumsum(np.where(held, hold, pace)),
+        direction=direction,
+        sense=direction[moving],
+        rate=np.where(held, 0.0, step / pace),
+        run=np.full(len(path), int(np.max(records.run)) + 1),
+        force=np.zeros(len(path)),
+        force_sd=np.full(len(path), float(np.mean(records.force_sd))),
+        **{n: np.full(len(path), v) for n, v in (last | columns).items()},
+    )
 
 
 def rank_runs(
@@ -65,30 +166,34 @@ def rank_runs(
         posterior_of: probability of each, by model of the noise.
         rng: source of randomness.
     """
-    share, problem = _candidates(searched, posterior_of), searched.problem
-    runs = candidate_runs(problem.records, problem.reading.reference_temperature)
-    if len(share) < 2 or not runs:
+    share, problem = _likeliest(searched, posterior_of), searched.problem
+    if len(share) < 2:
         return ()
-    weight, names = np.array([*share.values()]), [*share]
-    predicted = _predicted(searched, names, [run.records for run in runs])
+    weight, names, table = np.array([*share.values()]), [*share], searched.table
+    parts = [table.parts.get(key, []) for key in names]
+    fits = [
+        posterior(problem, table.likeliest_noise(key), each)
+        for key, each in zip(names, parts, strict=True)
+    ]
     # The same random numbers for every run: they are compared with each other.
-    drawn, ranked = rng.normal(size=(_DRAWS, ROWS)), []
-    for run, *both in zip(runs, *predicted, strict=True):
-        readings = _Readings(*both)
-        one, two = _farthest(readings, weight)
-        nats = _information(readings, weight, drawn)
-        found = NextRun(
-            run=run.words,
-            separates=_differing(names[one], names[two]),
-            information_nats=nats,
-            cost=run.cost,
-        )
-        ranked.append((round(nats / run.effort, 2), found))
+    drawn, ranked = rng.normal(size=(_DRAWS, _ROWS)), []
+    for run in candidate_runs(problem.records, problem.reading.reference_temperature):
+        mean, covariance = _predicted(searched, parts, fits, run.records)
+        nats = _information(mean, covariance, weight, drawn)
+        if nats >= _LEAST_NATS:
+            one, two = _farthest(mean, covariance, weight)
+            found = NextRun(
+                run=run.words,
+                separates=_differing(names[one], names[two]),
+                information_nats=nats,
+                cost=run.cost,
+            )
+            ranked.append((round(nats / run.effort, 2), found))
     ranked.sort(key=lambda item: -item[0])
-    return tuple(run for _, run in ranked if run.information_nats >= _LEAST_NATS)
+    return tuple(run for _, run in ranked)
 
 
-def _candidates(
+def _likeliest(
     searched: Searched, posterior_of: Mapping[Names, np.ndarray]
 ) -> dict[Names, float]:
     """Return the most probable effects and pairs, and none, with their shares."""
@@ -113,56 +218,55 @@ def _differing(one: Names, two: Names) -> tuple[Names, Names]:
 
 
 def _predicted(
-    searched: Searched, keys: Sequence[Names], runs: Sequence[Records]
-) -> _Readings:
-    """Return the readings of each run after all that were measured."""
-    problem, table = searched.problem, searched.table
+    searched: Searched,
+    hypotheses: Sequence[Sequence[Part]],
+    fits: Sequence[LinearPosterior],
+    run: Records,
+) -> tuple[Float[np.ndarray, "h m"], Float[np.ndarray, "h m m"]]:
+    """Return mean [N] and covariance of the readings of a run after all measured."""
+    problem = searched.problem
     about = problem.reading, problem.priors, problem.base, problem.log_sd
-    base = np.stack([base_columns(run, *about) for run in runs])
-    after = jax.tree.map(
-        lambda before, *new: np.stack([np.concatenate([before, n]) for n in new]),
-        *(problem.records, *runs),
+    base = base_columns(run, *about)
+    after = padded_records(
+        jax.tree.map(lambda *both: np.concatenate(both), problem.records, run)
     )
-    curves: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
     mean, covariance = [], []
-    for key in keys:
-        parts = table.parts.get(key, [])
-        fit = posterior(problem, table.likeliest_noise(key), parts)
-        columns = np.zeros((*base.shape[:2], len(fit.mean)))
-        columns[..., : problem.X.shape[1]] = base
-        offset = np.zeros(base.shape[:2])
+    for parts, fit in zip(hypotheses, fits, strict=True):
+        columns = np.zeros((_ROWS, len(fit.mean)))
+        columns[:, : base.shape[1]] = base
+        offset = np.zeros(_ROWS)
         for part, place in zip(parts, coefficients(problem, parts), strict=True):
-            which = part.component, part.place
-            if which not in curves:
-                curves[which] = _on_runs(searched, part, after)
-            start, own = curves[which]
-            offset += start + part.mean @ own
-            wide = np.moveaxis(part.sd[:, None] * own, 1, 2)
-            columns[..., place][..., : wide.shape[2]] = wide
+            start, slope = _on_run(searched, part, after)
+            offset += start
+            columns[:, place][:, : len(slope)] = slope.T
         mean.append(offset + columns @ fit.mean)
-        spread = columns @ fit.factor.T
-        noise = problem.noise_sd**2 * np.eye(ROWS)
-        covariance.append(spread @ np.swapaxes(spread, 1, 2) + noise)
-    return _Readings(np.stack(mean, axis=1), np.stack(covariance, axis=1))
+        half = columns @ fit.factor.T
+        covariance.append(half @ half.T + problem.noise_sd**2 * np.eye(_ROWS))
+    return np.stack(mean), np.stack(covariance)
 
 
-def _on_runs(
-    searched: Searched, part: Part, after: Records
-) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, "r j m"]]:
-    """Return offset and columns of a part on each run, history included."""
-    selection, component = searched.selection, part.component
-    assert part.place is not None
-    if np.any(selection.atoms.owner == component):
-        item = selection.atoms.pick(np.array([part.place.row]))
-    else:
-        item = selection.spaces[part.place.row]
-    found = searched.components.on_runs(searched.problem, component, item, after)
-    return found[0][:, -ROWS:], found[1][..., -ROWS:]
+def _on_run(searched: Searched, part: Part, after: Records):
+    """Return the part on the last rows at its mean, and its change per sd [N]."""
+    problem, grid = searched.problem, searched.components.grids[part.component]
+    count, rows = len(part.mean), len(problem.y)
+    if grid is None:
+        # The deviation of a new member is unknown.
+        return np.zeros(_ROWS), np.zeros((count, _ROWS))
+    # Several amplitudes are linear, in units of their prior sd.
+    ends = part.chord if count == 1 else grid.sd * np.eye(count)
+    values = grid.at(np.array(ends), part.shape)
+    curves = effect_curves(grid.effect, values, problem.base, after, problem.reading)
+    curves = curves[:, rows : rows + _ROWS]
+    if count > 1:
+        return np.zeros(_ROWS), part.sd[:, None] * curves
+    low, high = part.chord
+    slope = (curves[1] - curves[0]) / (high - low)
+    return curves[0] + (part.mean[0] - low) * slope, part.sd[0] * slope[None]
 
 
-def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -> float:
+def _information(mean, covariance, share: Float[np.ndarray, " h"], normal) -> float:
     """Return the mutual information of hypothesis and readings of one run [nat]."""
-    mean, factor = predicted.mean, np.linalg.cholesky(predicted.covariance)
+    factor = np.linalg.cholesky(covariance)
     inverse = np.linalg.inv(factor)
     half_log_det = np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
     total = 0.0
@@ -170,17 +274,15 @@ def _information(predicted: _Readings, share: Float[np.ndarray, " h"], normal) -
         drawn = mean[index] + normal @ factor[index].T
         off = (drawn - mean[:, None]) @ np.swapaxes(inverse, 1, 2)
         heights = -0.5 * np.einsum("hdm,hdm->hd", off, off) - half_log_det[:, None]
-        joint = heights + np.log(np.maximum(share, 1e-300))[:, None]
-        top = np.logaddexp.reduce(joint, axis=0)
+        top = np.logaddexp.reduce(heights + np.log(share)[:, None], axis=0)
         total += share[index] * float(np.mean(heights[index] - top))
     return max(total, 0.0)
 
 
-def _farthest(predicted: _Readings, share: Float[np.ndarray, " h"]) -> tuple[int, int]:
+def _farthest(mean, covariance, share: Float[np.ndarray, " h"]) -> tuple[int, int]:
     """Return the two hypotheses whose readings differ most."""
     one, two = np.triu_indices(len(share), 1)
-    gap = predicted.mean[one] - predicted.mean[two]
-    both = predicted.covariance[one] + predicted.covariance[two]
+    gap, both = mean[one] - mean[two], covariance[one] + covariance[two]
     squared = np.sum(gap * np.linalg.solve(both, gap[..., None])[..., 0], axis=1)
     best = int(np.argmax(squared * share[one] * share[two]))
     return int(one[best]), int(two[best])

@@ -1,10 +1,9 @@
 """Calibration of the probable hypotheses by NUTS, each with its probability.
 
 Every hypothesis of 5 % and more is calibrated, whatever the verdict. Where the others
-have more than 2 % together, a model with a leftover discrepancy is calibrated too and
-stands for them, as it bends wherever the data let it: the plain model with a leftover,
-or that of the likeliest effect where most of the others contain this effect. Below that
-the model that knows the stiffness least stands for them.
+have more than 2 % together, the likeliest hypothesis with a leftover discrepancy is
+calibrated too and stands for them, as it bends wherever the data let it. Below that the
+model that knows the stiffness least stands for them.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # without a model with a leftover.
-LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
+_LEAST_SHARE, _MOST_LEFT_OUT = 0.05, 0.02
 # Rows from which on a model takes minutes and more to calibrate.
 _MOST_ROWS = 5_000
 
@@ -39,20 +38,12 @@ class Refits:
             `none` for the plain model, `unknown` for that with a leftover gap. The
             probabilities sum to 1.
         left_out: probability without a model among these; None without any model.
-        failed: calibrations that failed their checks.
+        failures: calibrations that failed their checks, and why.
     """
 
     posteriors: Mapping[str, tuple[float, Posterior]]
     left_out: LeftOut | None
-    failed: Mapping[str, Posterior]
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """The calibrations that failed their checks, and why."""
-        return tuple(
-            f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
-            for name, fit in self.failed.items()
-        )
+    failures: tuple[str, ...]
 
 
 def rows_to_calibrate(case: Case) -> Case:
@@ -84,8 +75,7 @@ def refit(
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
-    names = {key: "+".join(key).replace(OUTSIDE, UNKNOWN) or NONE for key in hypotheses}
-    probabilities = {names[key]: chance for key, chance in hypotheses.items()}
+    probabilities = {_name(key): chance for key, chance in hypotheses.items()}
     count, finished = len(_probable(probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
@@ -120,57 +110,46 @@ def weighed(
         calibrated: returns the posterior of one.
     """
     fits = {name: calibrated(name) for name in _probable(probabilities)}
-    carrier = UNKNOWN
-    if _missing(probabilities, fits) > MOST_LEFT_OUT:
-        carrier = _open_model(probabilities, fits)
-        if carrier not in fits:
-            fits[carrier] = calibrated(carrier)
-        if not fits[carrier].usable and UNKNOWN not in fits:
-            fits[UNKNOWN] = calibrated(UNKNOWN)
     usable = {name: fit for name, fit in fits.items() if fit.usable}
-    failed = {name: fit for name, fit in fits.items() if not fit.usable}
+    missing = max(1.0 - sum(probabilities[name] for name in usable), 0.0)
+    carrier = ""
+    if missing > _MOST_LEFT_OUT:
+        likeliest = max(probabilities, key=probabilities.__getitem__)
+        for name in dict.fromkeys((_name({*_parts(likeliest), OUTSIDE}), UNKNOWN)):
+            fits[name] = fit = fits.get(name) or calibrated(name)
+            if fit.usable:
+                usable[name], carrier = fit, name
+                break
+    failed = {name: fit for name, fit in fits.items() if name not in usable}
+    failures = tuple(
+        f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
+        for name, fit in failed.items()
+    )
     if not usable:
-        return Refits({}, None, failed)
-    missing = _missing(probabilities, fits)
-    if carrier not in usable:
-        width = {n: float(np.std(f.draws["stiffness"])) for n, f in usable.items()}
-        carrier = UNKNOWN if UNKNOWN in usable else max(width, key=width.__getitem__)
+        return Refits({}, None, failures)
+    missing = max(1.0 - sum(probabilities.get(name, 0.0) for name in usable), 0.0)
+    width = {n: float(np.std(fit.draws["stiffness"])) for n, fit in usable.items()}
+    carrier = carrier or max(width, key=width.__getitem__)
     models = {
         name: (probabilities.get(name, 0.0) + missing * (name == carrier), fit)
         for name, fit in usable.items()
     }
-    return Refits(models, LeftOut(missing, carrier), failed)
+    return Refits(models, LeftOut(missing, carrier), failures)
 
 
 def _probable(probabilities: Mapping[str, float]) -> list[str]:
     """Return the hypotheses that are calibrated whatever the verdict."""
     ranked = sorted(probabilities, key=lambda name: -probabilities[name])
-    return [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
+    return [n for n in ranked if probabilities[n] >= _LEAST_SHARE] or ranked[:1]
 
 
-def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):
-    """Return the probability without a model that may be used."""
-    usable = [name for name, fit in fits.items() if fit.usable]
-    return max(1.0 - sum(probabilities.get(name, 0.0) for name in usable), 0.0)
+def _name(components: Iterable[str]) -> str:
+    """Return the name of a hypothesis: its effects in order, then `unknown`."""
+    effects = sorted({*components} - {OUTSIDE, UNKNOWN})
+    outside = {*components} & {OUTSIDE, UNKNOWN}
+    return "+".join([*effects, *([UNKNOWN] if outside else [])]) or NONE
 
 
-def _open_model(
-    probabilities: Mapping[str, float], fits: Mapping[str, Posterior]
-) -> str:
-    """Return the model with a leftover that suits most of what has no model."""
-    usable = {name for name, fit in fits.items() if fit.usable}
-    effects = frozenset().union(*map(_parts, usable)) - {UNKNOWN}
-
-    def share(effect: str, among: Iterable[str]) -> float:
-        return sum(probabilities[n] for n in among if effect in _parts(n))
-
-    rest = probabilities.keys() - usable
-    likeliest = max(sorted(effects), key=lambda e: share(e, probabilities), default="")
-    half = 0.5 * sum(probabilities[name] for name in rest)
-    alike = bool(likeliest) and share(likeliest, rest) > half
-    return f"{likeliest}+{UNKNOWN}" if alike else UNKNOWN
-
-
-def _parts(hypothesis: str) -> frozenset[str]:
+def _parts(name: str) -> frozenset[str]:
     """Return the effects of a hypothesis, and `unknown` where it has a leftover."""
-    return frozenset(hypothesis.split("+")) - {NONE}
+    return frozenset(name.split("+")) - {NONE}

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from scipy.special import erf
 
 from hdcal.data.records import Records
-from hdcal.evidence.effect_curves import curves_on_runs, effect_curves
+from hdcal.evidence.effect_curves import effect_curves
 from hdcal.evidence.items import STEPS, Amplitudes, Atoms, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
@@ -45,28 +45,19 @@ _NONLINEAR = 1e-6
 _ROOT_2PI = float(np.sqrt(2.0 * np.pi))
 
 
-@dataclass(frozen=True)
-class Predicting:
-    """Effects of a library by whether they predict something for the rows.
+def lacking(
+    library: Mapping[str, type[Effect]], records: Records
+) -> dict[str, tuple[str, ...]]:
+    """Return the columns that effects need and that were not measured.
 
-    Attributes:
-        effects: those that do, by name.
-        lacking: columns that each of the others needs and that were not measured.
+    An effect with any of them predicts nothing for the rows.
     """
-
-    effects: dict[str, type[Effect]]
-    lacking: dict[str, list[str]]
-
-
-def predicting(library: Mapping[str, type[Effect]], records: Records) -> Predicting:
-    """Sort the effects of a library by whether they predict something for the rows."""
-    known, lacking = records.known, {}
+    known, found = records.known, {}
     for name, effect in library.items():
         columns = {_COLUMNS[n] for n in effect.needs - known if n in _COLUMNS} - known
         if columns:
-            lacking[name] = sorted(columns)
-    effects = {n: effect for n, effect in library.items() if n not in lacking}
-    return Predicting(effects, lacking)
+            found[name] = tuple(sorted(columns))
+    return found
 
 
 @dataclass(frozen=True)
@@ -84,37 +75,6 @@ class Components:
     grids: tuple[ParameterGrid | None, ...]
     atoms: Atoms
     spaces: tuple[Space, ...]
-
-    def on_runs(
-        self, problem: LinearProblem, owner: int, item: Atoms | Space, runs: Records
-    ) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, "r j n"]]:
-        """Return offset and columns of an item on other rows [N].
-
-        Args:
-            problem: that the item was made of.
-            owner: index of its effect.
-            item: a space, or a single atom.
-            runs: the other rows, several records of shape (r, n).
-        """
-        grid = self.grids[owner]
-        if grid is None:
-            # The deviation of a new member is unknown.
-            assert isinstance(item, Space)
-            shape = len(runs.force), len(item.columns), runs.force.shape[1]
-            return np.zeros(runs.force.shape), np.zeros(shape)
-        about = problem.base, runs, problem.reading
-        if isinstance(item, Space):
-            values = grid.at(grid.sd * np.eye(len(grid.amplitudes)), item.shape)
-            return np.zeros(runs.force.shape), curves_on_runs(
-                grid.effect, values, *about
-            )
-        linear = float(item.amplitude.precision[0]) > 0.0
-        low, high = item.amplitude.low[0], item.amplitude.high[0]
-        ends = np.array([0.0, grid.unit] if linear else [low, high])
-        values = grid.at(ends, int(item.shape[0]))
-        found = curves_on_runs(grid.effect, values, *about)
-        slope = (found[:, 1] - found[:, 0]) / (ends[1] - ends[0])
-        return found[:, 0] - slope * ends[0], slope[:, None]
 
 
 def components(

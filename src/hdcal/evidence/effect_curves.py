@@ -7,19 +7,13 @@ import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.exported import jit
-from hdcal.inference.force_model.padding import (
-    bucket_size,
-    pad_records,
-    repeat_last_row,
-)
+from hdcal.inference.force_model.padding import pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 
 # Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.
 _BLOCK, _MOST_VALUES = 64, 2**22
-# Records predicted at a time, at most.
-_RUNS = 11
 
 
 def padded_records(records: Records) -> Records:
@@ -39,11 +33,6 @@ def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
         return predict_reading(base, (effect,), records, reading)[0] - plain
 
     return jax.vmap(one)(effects)
-
-
-@jit
-def _curves_on_runs(effects: Effect, base: Base, runs: Records, reading: Reading):
-    return jax.vmap(lambda records: _curves(effects, base, records, reading))(runs)
 
 
 def effect_curves(
@@ -74,31 +63,3 @@ def effect_curves(
         some = {name: column[start : start + block] for name, column in table.items()}
         parts.append(np.asarray(_curves(effect(**some), base, padded, reading)))
     return np.concatenate(parts)[:count]
-
-
-def curves_on_runs(
-    effect: type[Effect],
-    values: dict[str, np.ndarray],
-    base: Base,
-    runs: Records,
-    reading: Reading,
-) -> np.ndarray:
-    """Return the effect's contribution to the mean reading of several records [N].
-
-    Args:
-        effect: the effect.
-        values: of every parameter, each of shape (g,).
-        base: the force model about which it acts.
-        runs: records of shape (r, n).
-        reading: how the rig reads.
-
-    Returns:
-        Shape (r, g, n).
-    """
-    count, rows = runs.force.shape
-    width = [(0, _RUNS - count), (0, bucket_size(rows) - rows)]
-    padded = jax.tree.map(
-        lambda column: np.pad(column, width, "edge"), replace(runs, known=frozenset())
-    )
-    found = _curves_on_runs(effect(**values), base, padded, reading)
-    return np.asarray(found)[:count, :, :rows]

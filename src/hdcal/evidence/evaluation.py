@@ -12,7 +12,7 @@ from hdcal.evidence.items import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.marginal import Marginal
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Context, Part, Place
+from hdcal.evidence.parts import Context, Part
 from hdcal.evidence.projection import Block, Projection
 
 # Relative sds by which a shape may deviate from the library's, and their probabilities.
@@ -177,21 +177,22 @@ class Evaluated:
         some = table[members]
         row, column = np.unravel_index(np.argmax(some), some.shape)
         spread = float(np.logaddexp.reduce(some, axis=None) - some.max())
-        place = Place(int(members[row]), int(column))
+        place = int(members[row]), int(column)
         if table is self.spaces:
-            space = [*self.selection.spaces, *self.extra][place.row]
+            space = [*self.selection.spaces, *self.extra][place[0]]
             return _space_part(space, place, spread)
         return self._atom_part(component, place, spread)
 
-    def _atom_part(self, component: int, place: Place, spread: float) -> Part:
-        selection = self.selection
-        atom = selection.atoms.pick(np.array([place.row]))
+    def _atom_part(self, component: int, place: tuple[int, int], spread: float) -> Part:
+        selection, (row, column) = self.selection, place
+        atom = selection.atoms.pick(np.array([row]))
         size = atom.bounded(self.atoms.mean[place][None])
         of_component = selection.atoms.owner == component
-        low = selection.atoms.amplitude.low[of_component]
-        log_chance = self.atoms.log_evidence[place.row]
+        least = selection.atoms.amplitude.low[of_component].min()
+        low, high = atom.amplitude.low[0], atom.amplitude.high[0]
+        log_chance = self.atoms.log_evidence[row]
         chance = np.exp(log_chance - np.logaddexp.reduce(log_chance))
-        loose = _TOLERANCES[:, None, None] * selection.tolerance[place.row]
+        loose = _TOLERANCES[:, None, None] * selection.tolerance[row]
         levels = tuple(zip(map(float, chance), loose, strict=True))
         return Part(
             component=component,
@@ -199,15 +200,17 @@ class Evaluated:
             columns=atom.slope,
             mean=size,
             sd=np.maximum(np.abs(size), self.atoms.sd[place]),
-            loose=levels[place.column][1],
-            one_sided=bool(low.min() >= 0.0),
+            loose=levels[column][1],
+            one_sided=bool(least >= 0.0),
+            shape=int(atom.shape[0]),
+            chord=(float(low), float(high)) if np.isfinite(high) else (0.0, 1.0),
             place=place,
             spread=spread,
             levels=levels,
         )
 
 
-def _space_part(space: Space, place: Place, spread: float) -> Part:
+def _space_part(space: Space, place: tuple[int, int], spread: float) -> Part:
     count, rows = space.columns.shape
     fixed = np.zeros((0, rows))
     return Part(
@@ -215,9 +218,11 @@ def _space_part(space: Space, place: Place, spread: float) -> Part:
         offset=np.zeros(rows),
         columns=space.columns,
         mean=np.zeros(count),
-        sd=np.full(count, space.scale[place.column]),
+        sd=np.full(count, space.scale[place[1]]),
         loose=fixed,
         one_sided=False,
+        shape=space.shape,
+        chord=(0.0, 1.0),
         place=place,
         spread=spread,
         levels=((1.0, fixed),),

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from hdcal.evidence.components import components, predicting
+from hdcal.evidence.components import components, lacking
 from hdcal.evidence.evaluation import Evaluated, select
 from hdcal.evidence.items import Space
 from hdcal.evidence.linear_problem import LinearProblem
@@ -56,13 +56,12 @@ class Hypotheses:
         library: Mapping[str, type[Effect]],
         known_kernels: list[Space] | None = None,
     ):
-        self.problem, self.predicting = problem, predicting(library, problem.records)
-        self.components = effects = components(self.predicting.effects, problem)
+        self.problem, self.lacking = problem, lacking(library, problem.records)
+        self.effects = {n: e for n, e in library.items() if n not in self.lacking}
+        self.components = effects = components(self.effects, problem)
         self.outside = len(effects.names)
         self.families = local_families(problem)
-        if known_kernels is None:
-            known_kernels = kernels(problem, effects, self.outside)
-        self.kernels = known_kernels
+        self.kernels = known_kernels or kernels(problem, effects, self.outside)
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
         self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
@@ -164,12 +163,7 @@ class Hypotheses:
             self._grow(key, columns[:1])
 
     def _grow(self, key: Names, columns: Sequence[int]) -> None:
-        """Add kernels to the remainder of a hypothesis while the evidence grows.
-
-        Args:
-            key: the hypothesis.
-            columns: indices of the models of the noise.
-        """
+        """Add kernels to the remainder of a hypothesis while the evidence grows."""
         table, outside = self.table, self.outside
         for _ in range(_MOST_KERNELS - 1):
             parts, before = table.parts[key], table.log_evidence[key].max()
@@ -194,12 +188,9 @@ class Hypotheses:
     def _extend(
         self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
     ) -> None:
-        """Enter everything given some parts.
+        """Enter everything, or some components, given some parts.
 
-        Args:
-            parts: one component, or a pair whose evidence is in the table.
-            columns: indices of the models of the noise.
-            only: the components to enter; by default all.
+        These are one component, or a pair whose evidence is in the table.
         """
         table = self.table
         key = tuple(sorted(table.names[part.component] for part in parts))

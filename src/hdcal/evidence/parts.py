@@ -24,13 +24,6 @@ class Context(NamedTuple):
     columns: Float[np.ndarray, "c n"]
 
 
-class Place(NamedTuple):
-    """Row and column of an item in the tables of a selection."""
-
-    row: int
-    column: int
-
-
 class Part(NamedTuple):
     """One component at its most probable item: offset + columns · a + loose columns.
 
@@ -42,7 +35,9 @@ class Part(NamedTuple):
         sd: of a, likewise.
         loose: columns of the shape's tolerance [N per sd], shape (l, n).
         one_sided: whether a is not negative.
-        place: of the item; None where the part is several.
+        shape: index of the point of the shape parameters; −1 without one.
+        chord: two amplitudes between which one column is exact.
+        place: row and column of the item in a selection; None where it is several.
         spread: log evidence of the component less that of the item, where it was found.
         levels: probability of each tolerance of the shape, with its loose columns.
     """
@@ -54,7 +49,9 @@ class Part(NamedTuple):
     sd: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
     one_sided: bool
-    place: Place | None
+    shape: int
+    chord: tuple[float, float]
+    place: tuple[int, int] | None
     spread: float
     levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
 
@@ -171,15 +168,7 @@ def sampled_curves(
     count: int,
     rng: np.random.Generator,
 ) -> DrawnCurves:
-    """Return posterior draws of the parts of a hypothesis.
-
-    Args:
-        problem: the case.
-        noise: model of the noise.
-        parts: of the hypothesis.
-        count: number of draws.
-        rng: source of randomness.
-    """
+    """Return posterior draws of the parts of a hypothesis."""
     levels = [*product(*(part.levels for part in parts))]
     chance = np.array([np.prod([share for share, _ in each]) for each in levels])
     chance = chance / chance.sum()

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.evidence.components import Components, Predicting
-from hdcal.evidence.evaluation import Selection
+from hdcal.evidence.components import Components
 from hdcal.evidence.hypotheses import Hypotheses
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import NoiseModel
@@ -36,18 +35,18 @@ class Searched:
     Attributes:
         problem: the linear problem.
         table: evidence of each hypothesis.
-        predicting: effects of the library by whether they predict something.
-        components: of these effects.
-        selection: the items that were compared.
+        effects: of the library that predict something for the rows, by name.
+        lacking: columns that each of the others needs and that were not measured.
+        components: of the effects.
         kernels: columns of each kernel of the remainder [N], shape (j, n).
         coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
     """
 
     problem: LinearProblem
     table: EvidenceTable
-    predicting: Predicting
+    effects: Mapping[str, type[Effect]]
+    lacking: Mapping[str, tuple[str, ...]]
     components: Components
-    selection: Selection
     kernels: list[np.ndarray]
     coarse_step: float
 
@@ -55,12 +54,9 @@ class Searched:
 def search(
     case: Case, library: Mapping[str, type[Effect]], *, free_runs: bool = False
 ) -> Searched:
-    """Return the evidence of all hypotheses of a case.
+    """Return the evidence of all hypotheses of a case, of effects by name.
 
-    Args:
-        case: gear and records.
-        library: effects to consider, by name.
-        free_runs: whether each run has an unknown force offset, whatever acts.
+    With `free_runs` each run has an unknown force offset, whatever acts.
 
     Raises:
         InputError: an effect has no prior.
@@ -83,9 +79,9 @@ def search(
     return Searched(
         problem=problem,
         table=found.table,
-        predicting=found.predicting,
+        effects=found.effects,
+        lacking=found.lacking,
         components=found.components,
-        selection=found.selection,
         kernels=[space.columns for space in found.kernels],
         coarse_step=step,
     )

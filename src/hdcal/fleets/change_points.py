@@ -1,6 +1,6 @@
 """Whether values taken on dates change: not, by steps, steadily, or from day to day.
 
-Each of the four has its evidence in closed form, given the scatter of values of one
+The evidence of each of the four has a closed form given the scatter of values of one
 level, which is integrated over a grid. Before the data, levels scatter in proportion to
 it. Steps are those of a product partition: any date may begin a new level.
 
@@ -10,7 +10,7 @@ Source:
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
@@ -28,48 +28,41 @@ _EXPECTED = 1.0
 # Probability of intervals.
 _SURE = 0.95
 
+# Median, lower and upper end of an interval.
+Ends = tuple[float, float, float]
 
-@dataclass(frozen=True)
-class LevelStep:
-    """A change of the level.
 
-    Attributes:
-        before: index of the last date that lies before it, with 97.5 % probability.
-        after: index of the first date that lies after it, likewise.
-        size: median, lower and upper end of its 95 % interval.
-    """
+class LevelStep(NamedTuple):
+    """Change of the level between two dates, by their indices, 97.5 % sure each."""
 
     before: int
     after: int
-    size: tuple[float, float, float]
+    size: Ends
 
 
-@dataclass(frozen=True)
-class Changes:
+class Changes(NamedTuple):
     """Posterior of the ways in which values change.
 
     Attributes:
         ways: probability of each of `WAYS`.
         steps: the likeliest ones, if there are steps.
-        drift: from the first date to the last, if it is steady: median, lower and upper
-            end of its 95 % interval.
+        drift: from the first date to the last, if it is steady.
         days_sd: sd of the levels of dates, if each has its own.
     """
 
     ways: dict[str, float]
-    steps: tuple[LevelStep, ...]
-    drift: tuple[float, float, float]
+    steps: list[LevelStep]
+    drift: Ends
     days_sd: float
 
 
-@dataclass(frozen=True)
-class _Sums:
-    """Sums of values by date, one row for each scatter of the grid.
+class _Sums(NamedTuple):
+    """Sums over values of variance τ² + v, by the scatter τ of the grid, [scatter, …].
 
     Attributes:
-        weight: Σ 1/(τ² + v), cumulated from zero; [scatter, date + 1].
-        first: Σ e/(τ² + v) likewise.
-        second: Σ e²/(τ² + v) + log(τ² + v) likewise.
+        weight: Σ 1/(τ² + v), cumulated over dates from zero; likewise the next two.
+        first: Σ e/(τ² + v).
+        second: Σ e²/(τ² + v) + log(τ² + v).
         level: variance of levels before the data; [scatter, 1].
     """
 
@@ -108,19 +101,25 @@ def changes(
     ends = np.arange(len(time) + 1)
     none = sums.segment([0], [len(time)])[:, 0]
     days = sums.segment(ends[:-1], ends[1:]).sum(axis=1)
-    steps, begins = _partitions(sums, none)
+    segments, unchanged = _segments(sums)
+    partitions = _partitions(segments)
+    # A partition of one level has no step, in the data and before them.
+    steps = partitions[:, -1] - np.log(-np.expm1(unchanged))
+    alone = np.minimum(none + unchanged - partitions[:, -1], -1e-12)
+    steps += np.log(-np.expm1(alone))
     place = (time - time[0]) / (time[-1] - time[0]) - 0.5
     drift, slope, slope_variance = _line(sums, place)
     evidence = np.stack([none, steps, drift, days])
-    prior = np.log([*WAYS.values()])
-    ways = softmax(logsumexp(evidence, axis=1) + prior)
+    ways = softmax(logsumexp(evidence, axis=1) + np.log([*WAYS.values()]))
     of_steps, of_drift, of_days = softmax(evidence, axis=1)[1:]
+    likeliest = np.argmax(of_steps)
+    found = _ends(partitions[likeliest], segments[likeliest])
     levels, errors = sums.posterior(ends[:-1], ends[1:])
     # Levels scatter by what their means do and by what these are unsure by.
     scatter = levels.var(axis=1, ddof=1) + errors.mean(axis=1)
     return Changes(
         ways=dict(zip(WAYS, ways.tolist(), strict=True)),
-        steps=tuple(_steps(sums, of_steps, of_steps @ begins)),
+        steps=[*_steps(sums, of_steps, found)],
         drift=_interval(of_drift, slope, slope_variance),
         days_sd=float(np.sqrt(of_days @ scatter)),
     )
@@ -139,35 +138,47 @@ def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
     return _Sums(weight, first, second, (_LEVELS * scatter) ** 2)
 
 
-def _partitions(sums: _Sums, none: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the log evidence of one step or more, and where levels begin.
+def _segments(sums: _Sums) -> tuple[np.ndarray, float]:
+    """Return log prior and evidence of a level by its ends, and log prior of no step.
 
     Returns:
-        Log evidence, shape (scatter,), and the probability that a level begins at each
-        date, shape (scatter, date).
+        Of each [scatter, start, stop]; and of one level over all dates.
     """
-    scatters, dates = len(none), sums.weight.shape[1] - 1
-    begin = min(_EXPECTED / (dates - 1), 0.5)
-    go_on, anew = np.log1p(-begin), np.log(begin)
-    forward, backward = np.zeros((2, scatters, dates + 1))
-    for stop in range(1, dates + 1):
+    scatters, ends = sums.weight.shape
+    begin = min(_EXPECTED / (ends - 2), 0.5)
+    found = np.full((scatters, ends, ends), -np.inf)
+    for stop in range(1, ends):
         start = np.arange(stop)
-        prior = (stop - start - 1) * go_on + np.where(start > 0, anew, 0.0)
-        each = forward[:, :stop] + sums.segment(start, [stop]) + prior
-        forward[:, stop] = logsumexp(each, axis=1)
-    for start in range(dates - 1, 0, -1):
-        stop = np.arange(start + 1, dates + 1)
-        prior = (stop - start - 1) * go_on + np.where(stop < dates, anew, 0.0)
-        each = backward[:, stop] + sums.segment([start], stop) + prior
-        backward[:, start] = logsumexp(each, axis=1)
-    # A partition of one level has no step, in the data and before them.
-    alone = none + (dates - 1) * go_on
-    whole = forward[:, -1]
-    steps = whole + np.log(-np.expm1(np.minimum(alone - whole, -1e-12)))
-    begins = forward[:, :-1] + anew + backward[:, :-1] - steps[:, None]
-    begins = np.exp(np.minimum(begins, 0.0))
-    begins[:, 0] = 0.0
-    return steps - np.log(-np.expm1((dates - 1) * go_on)), begins
+        prior = (stop - start - 1) * np.log1p(-begin)
+        prior += np.where(start > 0, np.log(begin), 0.0)
+        found[:, :stop, stop] = sums.segment(start, [stop]) + prior
+    return found, (ends - 2) * float(np.log1p(-begin))
+
+
+def _partitions(segments: np.ndarray) -> np.ndarray:
+    """Return log prior and evidence of all partitions up to a date, [scatter, stop]."""
+    scatters, ends, _ = segments.shape
+    found = np.zeros((scatters, ends))
+    for stop in range(1, ends):
+        each = found[:, :stop] + segments[:, :stop, stop]
+        found[:, stop] = logsumexp(each, axis=1)
+    return found
+
+
+def _ends(partitions: np.ndarray, segments: np.ndarray) -> list[int]:
+    """Return the ends of the likeliest levels of one scatter, from the last one back.
+
+    Args:
+        partitions: [stop].
+        segments: [start, stop].
+    """
+    ends = [len(partitions) - 1]
+    while ends[0] > 0:
+        start = np.arange(ends[0])
+        ends.insert(0, int(np.argmax(partitions[start] + segments[start, ends[0]])))
+    if len(ends) == 2:
+        ends.insert(1, 1 + int(np.argmax(segments[0, 1:-1] + segments[1:-1, -1])))
+    return ends
 
 
 def _line(sums: _Sums, place: np.ndarray):
@@ -185,51 +196,29 @@ def _line(sums: _Sums, place: np.ndarray):
     return evidence, (a * q - b * p) / determinant, a / determinant
 
 
-def _steps(sums: _Sums, share: np.ndarray, begins: np.ndarray) -> Iterator[LevelStep]:
-    """Yield the likeliest steps, each with place and size given the other steps.
+def _steps(sums: _Sums, share: np.ndarray, ends: list[int]) -> Iterator[LevelStep]:
+    """Yield steps, each with place and size given the other steps.
 
     Args:
         sums: of the values.
         share: probability of each scatter.
-        begins: probability that a level begins at each date, shape (date,).
+        ends: of the levels.
     """
-    found = _likeliest(sums, int(np.argmax(share))) or [int(np.argmax(begins))]
-    ends = [0, *found, len(begins)]
     for start, stop in zip(ends, ends[2:], strict=False):
         place = np.arange(start + 1, stop)
         likely = sums.segment([start], place) + sums.segment(place, [stop])
         weight = share[:, None] * softmax(likely, axis=1)
         within = np.cumsum(weight.sum(axis=0))
         first, last = np.searchsorted(within, [0.5 - 0.5 * _SURE, 0.5 + 0.5 * _SURE])
-        (old, old_variance), (new, new_variance) = (
-            sums.posterior(*between) for between in (([start], place), (place, [stop]))
-        )
+        old, old_variance = sums.posterior([start], place)
+        new, new_variance = sums.posterior(place, [stop])
         size = _interval(weight, new - old, old_variance + new_variance)
         yield LevelStep(int(place[first]) - 1, int(place[last]), size)
 
 
-def _likeliest(sums: _Sums, scatter: int) -> list[int]:
-    """Return the dates at which levels begin in the likeliest partition."""
-    dates = sums.weight.shape[1] - 1
-    begin = min(_EXPECTED / (dates - 1), 0.5)
-    best, came = np.zeros(dates + 1), np.zeros(dates + 1, int)
-    for stop in range(1, dates + 1):
-        start = np.arange(stop)
-        each = best[:stop] + sums.segment(start, [stop])[scatter]
-        each += np.where(start > 0, np.log(begin / (1.0 - begin)), 0.0)
-        came[stop] = np.argmax(each)
-        best[stop] = each[came[stop]]
-    found, at = [], came[-1]
-    while at > 0:
-        found.insert(0, int(at))
-        at = came[at]
-    return found
-
-
-def _interval(share, mean, variance) -> tuple[float, float, float]:
+def _interval(share, mean, variance) -> Ends:
     """Return the interval of a mixture of normals by its mean and its variance."""
     middle = float(np.sum(share * mean))
     sd = np.sqrt(np.sum(share * (variance + (mean - middle) ** 2)))
-    half = ndtri(0.5 + 0.5 * _SURE) * sd
-    low, high = middle - half, middle + half
-    return middle, float(low), float(high)
+    half = float(ndtri(0.5 + 0.5 * _SURE) * sd)
+    return middle, middle - half, middle + half

@@ -1,13 +1,19 @@
-"""`hdcal fleet`: many gears of one kind, and which of them are odd."""
+"""`hdcal fleet`: many gears of one kind; `hdcal margin`: of these, or of one gear."""
 
 from typing import Any
 
 import click
 
 from hdcal.cli import options
-from hdcal.cli.command import command
+from hdcal.cli.command import Command, command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
+from hdcal.prediction.margin.command import margin as of_models
+
+# Options without a meaning for a fleet: its lines are the same in both directions, and
+# gears to come are those of its population, at the reference temperature.
+_OTHERS = ("quantity", "population", "direction", "temperature", "given_force", "seed")
+_OTHERS += ("tolerances", "rule", "certificate")
 
 
 @command(short_help="Compare many gears: scatter, outliers, the next gear.")
@@ -30,11 +36,6 @@ from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
     metavar="TABLE",
     help="Read the sizes of each gear from a table, if they differ.",
 )
-@click.option(
-    "--since",
-    metavar="DAY",
-    help="Leave out readings before a day, as 2026-09-01.",
-)
 @options.skip_bad_option
 @click.option(
     "--scheduler",
@@ -45,8 +46,8 @@ from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 @options.folder_options("Write the result to DIR [default: NAME-fleet].")
 @options.json_option
 @click.pass_obj
-def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **given):
-    """Compare the gears in DATA: their stiffness, their scatter, the odd ones.
+def fleet(console: Console, out, force, scheduler, gears, skip_bad, **given):
+    """Compare the gears in DATA: stiffness, scatter, outliers.
 
     DATA has a column `specimen`, gear or serial, or is a folder with a file, or a
     folder of data.csv and gear.toml, for each gear.
@@ -64,8 +65,6 @@ def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **giv
         wrong += implausible("seed", asked["seed"])
         wrong += implausible("force_tolerance", asked["force_tolerance"])
         readings = read_gears(console, scheduler, given)
-        if readings is not None and since is not None:
-            readings = wrong.attempt(readings.since, since)
         if readings is not None:
             name = readings.case.name
             readings = wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
@@ -78,10 +77,13 @@ def fleet(console: Console, out, force, scheduler, since, gears, skip_bad, **giv
             wrong += force_findings(at, limit, *reach)
         console.reserve_folder(out, force)
     assert readings is not None
-    from hdcal.fleets.fleet import fleet as compared
+    from hdcal.fleets.fleet import fleet_of
+    from hdcal.fleets.model.population import fit_population
+    from hdcal.fleets.model.sampling import Sampling
 
     with progress_bar() as progress:
-        found = compared(readings, progress=progress, **asked)
+        sampling = Sampling(seed=asked.pop("seed"), progress=progress)
+        found = fleet_of(readings, fit_population(readings, sampling), **asked)
     table = found.to_frame()
     others = {FILE_NAME: found.posterior.to_netcdf}
     if (parquet := frame_parquet(table)) is not None:
@@ -101,3 +103,44 @@ def read_gears(console: Console, scheduler: str | None, given: dict[str, Any]):
         outside = ["sheet", "specimen"]
         console.wrong += options.without_meaning(outside, "a folder of gears")
     return console.wrong.attempt(read_fleet, scheduler=scheduler, **given)
+
+
+@click.pass_context
+def _margin(context: click.Context, run: str, **asked):
+    from hdcal.inference.posterior_file import FLEET, kind_of
+
+    if kind_of(run) is FLEET:
+        return _of_fleet(context.obj, run, **asked)
+    assert of_models.callback is not None
+    return context.invoke(of_models.callback, run=run, **asked)
+
+
+def _of_fleet(console: Console, run: str, out, force, deformation, **asked):
+    from hdcal.fleets.posterior import FleetPosterior
+
+    found = None
+    with console.wrong as wrong:
+        posterior = wrong.attempt(FleetPosterior.load, run)
+        console.reserve_folder(out, force)
+        wrong += options.without_meaning(_OTHERS, "the result of a fleet")
+        if posterior is not None:
+            shares = {"confidence": asked["confidence"]}
+            if options.is_given("content"):
+                shares["content"] = asked["content"]
+            limit, units = asked["limit_force"], posterior.units
+            wrong += unit_findings(units, deformation=deformation, limit_force=limit)
+            # A text that is no number was refused while the options were read.
+            if deformation is not None:
+                found = wrong.attempt(posterior.margin, deformation, limit, **shares)
+    assert found is not None
+    return console.show(found, answer="margin.json")
+
+
+margin = Command(
+    "margin",
+    callback=_margin,
+    params=of_models.params,
+    help=of_models.help,
+    short_help=of_models.short_help,
+    context_settings=of_models.context_settings,
+)

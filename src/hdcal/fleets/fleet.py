@@ -43,7 +43,6 @@ def fleet(
     limit_force: float | None = None,
     force_tolerance: float | None = None,
     gears: Any = None,
-    since: str | None = None,
     scheduler: str | None = None,
     skip_bad: bool = False,
     progress: Progress | None = None,
@@ -71,7 +70,6 @@ def fleet(
             `deformation`, may lie [N].
         gears: table of the sizes of each gear, if they differ: a file or a table in
             memory with a column specimen and columns such as wall_thickness_mm.
-        since: day, as 2026-09-01, before which readings are left out.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
         skip_bad: leave out gears with a faulty row or size, or without a slope.
@@ -85,40 +83,29 @@ def fleet(
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
     readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
-    if since is not None:
-        readings = readings.since(since)
     readings = usable(readings, gears, skip_bad=skip_bad)
     with Findings() as wrong:
         case, given = readings.case, (deformation, limit_force)
         wrong += force_findings(*given, readings.largest, case.gear.reach, case.units)
-    sampling = Sampling(chains, warmup, draws, seed, progress)
-    fit = fit_population(readings, sampling)
-    return fleet_of(
-        readings,
-        fit,
-        deformation=deformation,
-        limit_force=limit_force,
-        force_tolerance=force_tolerance,
-    )
+    fit = fit_population(readings, Sampling(chains, warmup, draws, seed, progress))
+    return fleet_of(readings, fit, deformation, limit_force, force_tolerance)
 
 
 def fleet_of(
     readings: FleetReadings,
     fit: FittedFleet,
-    *,
     deformation: float | None = None,
     limit_force: float | None = None,
     force_tolerance: float | None = None,
 ) -> Fleet:
     """Return the result of a fitted population; the arguments are those of `fleet`."""
     case, draws, seed = readings.case, fit.draws, int(fit.settings["seed"])
-    largest = readings.largest
-    at = largest if deformation is None else deformation
-    reasons = tuple(c.words for c in fit.checks if c.outcome == "failed")
+    largest, reasons = readings.largest, fit.failed
     needed = None
     if deformation is not None and not reasons:
         how = {"tested": largest, "seed": seed}
         needed = next_force(draws, deformation, limit_force, **how)
+    at = largest if deformation is None else deformation
     table = gear_table(readings, fit)
     return Fleet(
         reasons=reasons,
@@ -128,7 +115,7 @@ def fleet_of(
         rows=int(readings.sums.rows.sum()),
         left_out=gears_left_out(readings),
         flagged=() if reasons else flagged_gears(table),
-        false_discovery_rate=None if reasons else false_discovery_rate(table),
+        false_discovery_rate=None if reasons else false_discovery_rate(fit),
         at_one_size=readings.size_ratio is not None,
         population=_population(fit),
         **_groups(readings, fit),
@@ -148,42 +135,47 @@ def fleet_of(
 
 
 def _population(fit: FittedFleet) -> Population:
-    draws = fit.draws
-
-    def interval(site: str, factor: float = 1.0) -> Interval | None:
-        return Interval.of(factor * draws[site]) if site in draws else None
-
-    return Population(
-        stiffness_N_per_mm=Interval.of(draws["stiffness"]),
-        gear_sd_percent=Interval.of(100.0 * draws["specimen_sd"]),
-        lot_sd_percent=interval("lot_sd", 100.0),
-        rig_sd_percent=interval("rig_sd", 100.0),
-        operator_sd_N=interval("operator_sd"),
-        mounting_sd_N=Interval.of(draws["run_offset_sd"]),
-        reading_sd_N=Interval.of(draws["sigma"]),
-        zero_N=Interval.of(draws["zero"]),
-        loop_N=interval("loop"),
-        bend_N=interval("bend"),
-        correlation=fit.correlation,
-    )
+    sites = {
+        "stiffness_N_per_mm": "stiffness",
+        "gear_sd_percent": "specimen_sd",
+        "lot_sd_percent": "lot_sd",
+        "rig_sd_percent": "rig_sd",
+        "operator_sd_N": "operator_sd",
+        "mounting_sd_N": "run_offset_sd",
+        "reading_sd_N": "sigma",
+        "zero_N": "zero",
+        "loop_N": "loop",
+        "bend_N": "bend",
+    }
+    found: dict[str, Any] = dict.fromkeys(sites)
+    for name, site in sites.items():
+        if site in fit.draws:
+            scale = 100.0 if name.endswith("percent") else 1.0
+            found[name] = Interval.of(scale * fit.draws[site])
+    return Population(**found, correlation=fit.fits.correlation)
 
 
 def _groups(readings: FleetReadings, fit: FittedFleet) -> dict[str, Any]:
     """Return the lots, operators and rigs that are distinguished."""
     case, centre = readings.case, fit.draws["stiffness"]
-    units = case.units.stiffness_unit, case.units.load_unit, "%"
     lots, operators, rigs = (
         np.asarray(group_offsets(fit.draws, kind))
         for kind in ("lot", "operator", "rig")
     )
-    found = {}
-    for kind, names, labels, draws, unit in (
-        ("lots", fit.lots, case.lots, centre * (1.0 + lots), units[0]),
-        ("operators", fit.operators, case.operators, operators, units[1]),
-        ("rigs", fit.rigs, case.rigs, 100.0 * rigs, units[2]),
-    ):
-        found[kind] = tuple(
-            Group(name=n, members=labels.count(n), value=Interval.of(each), unit=unit)
-            for n, each in zip(names, draws, strict=False)
+    each = {
+        "lots": (centre * (1.0 + lots), case.units.stiffness_unit),
+        "operators": (operators, case.units.load_unit),
+        "rigs": (100.0 * rigs, "%"),
+    }
+    return {
+        kind: tuple(
+            Group(
+                name=name,
+                members=getattr(case, kind).count(name),
+                value=Interval.of(value),
+                unit=unit,
+            )
+            for name, value in zip(getattr(fit.groups, kind), values, strict=False)
         )
-    return found
+        for kind, (values, unit) in each.items()
+    }

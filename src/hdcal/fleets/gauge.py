@@ -26,7 +26,6 @@ class GaugeRR(Item):
     """Ability of one reading of the force to distinguish gears; 95 % intervals.
 
     Attributes:
-        deformation_mm: at which the force is read.
         repeatability_N: sd of readings on one mounting.
         reproducibility_N: sd between mountings, operators and rigs.
         gears_N: sd between ordinary gears and lots.
@@ -51,12 +50,9 @@ class GaugeRR(Item):
 def gauge_rr(
     draws: Mapping[str, np.ndarray], deformation: float, tolerance: float | None = None
 ) -> GaugeRR:
-    """Return the gauge R&R of a population.
+    """Return the gauge R&R of a population, from its draws by site.
 
-    Args:
-        draws: of the population by site, shape (d,).
-        deformation: at which the force is read [mm as read].
-        tolerance: width within which the force may lie [N].
+    The force is read at a deformation [mm as read]; it may lie within a width [N].
     """
     none = np.zeros(1)
     repeat = reading_sd(draws)
@@ -66,10 +62,9 @@ def gauge_rr(
     gears = force * np.hypot(draws["specimen_sd"], draws.get("lot_sd", none))
     gauge = np.hypot(repeat, mounted)
     study = Interval.of(100.0 * gauge / np.hypot(gauge, gears))
-    within = None
-    if tolerance is not None:
-        within = Interval.of(100.0 * _WIDTH * gauge / tolerance)
-    categories = Interval.of(_CATEGORIES * gears / gauge)
+    share = None if tolerance is None else 100.0 * _WIDTH * gauge / tolerance
+    within = None if share is None else Interval.of(share)
+    categories = dict(Interval.of(_CATEGORIES * gears / gauge))
     return GaugeRR(
         deformation_mm=deformation,
         repeatability_N=Interval.of(repeat),
@@ -78,9 +73,7 @@ def gauge_rr(
         percent_study_variation=study,
         percent_tolerance=within,
         distinct_categories=Interval(
-            median=float(int(categories.median)),
-            lo=float(int(categories.lo)),
-            hi=float(int(categories.hi)),
+            **{n: float(int(v)) for n, v in categories.items()}
         ),
         grade=_grade(within or study),
     )

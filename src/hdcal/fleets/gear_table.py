@@ -7,7 +7,6 @@ import pandas as pd
 
 from hdcal.data.measurements.bad_gears import cause
 from hdcal.data.theory_names import SPRING
-from hdcal.fleets.model.gear_quantity import MOST_FALSE
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.distributions import moments
@@ -43,37 +42,29 @@ class GearLeftOut(Item):
 
 
 def gear_table(readings: FleetReadings, fit: FittedFleet) -> pd.DataFrame:
-    """Return what is known of each gear, one row a gear.
-
-    Args:
-        readings: of the gears.
-        fit: of their population.
-    """
+    """Return what is known of each gear, one row a gear."""
     case, sums, gears = readings.case, readings.sums, fit.gears
-    ratio = readings.size_ratio
-    own = 1.0 if ratio is None else ratio
-    odd = np.stack([gears[f"off_{name}"] for name in QUANTITIES])
-    flagged = 1.0 - odd <= MOST_FALSE
+    ratio = 1.0 if readings.size_ratio is None else readings.size_ratio
+    flagged = np.stack([fit.flagged(name) for name in QUANTITIES], axis=1)
+    off = gears[[f"off_{name}" for name in QUANTITIES]]
     columns = {
         "gear": case.specimen_labels,
         **({"lot": case.lots} if case.lots else {}),
         "rows": np.bincount(sums.gear, sums.rows).astype(int),
         "runs": np.bincount(sums.gear),
-        "stiffness_N_per_mm": own * gears["stiffness"],
-        "stiffness_lo": own * gears["stiffness_lo"],
-        "stiffness_hi": own * gears["stiffness_hi"],
-        **({} if ratio is None else {"size_ratio": ratio}),
+        "stiffness_N_per_mm": ratio * gears["stiffness"],
+        "stiffness_lo": ratio * gears["stiffness_lo"],
+        "stiffness_hi": ratio * gears["stiffness_hi"],
+        **({} if readings.size_ratio is None else {"size_ratio": ratio}),
         **_influence(readings, fit),
     }
     names = ["apart_percent", "apart_lo", "apart_hi", "distance_sd"]
     names += ["zero_N", "noise_sd_N", "loop_N", "bend_N"]
-    columns |= {name: gears[name] for name in names}
-    columns |= {f"off_{name}": gears[f"off_{name}"] for name in QUANTITIES}
-    return pd.DataFrame(columns).assign(
-        probability_off=odd.max(axis=0),
-        flagged=flagged.any(axis=0),
-        flagged_in=[", ".join(np.array(QUANTITIES)[each]) for each in flagged.T],
-        status="failed" if any(c.outcome == "failed" for c in fit.checks) else "ok",
+    return pd.DataFrame({**columns, **gears[names], **off}).assign(
+        probability_off=off.max(axis=1),
+        flagged=flagged.any(axis=1),
+        flagged_in=[", ".join(np.array(QUANTITIES)[each]) for each in flagged],
+        status="failed" if fit.failed else "ok",
     )
 
 
@@ -94,27 +85,24 @@ def flagged_gears(table: pd.DataFrame) -> tuple[Flagged, ...]:
     first = table["flagged_in"].str.contains("stiffness")
     order = ["first", "probability_off"]
     found = table.assign(first=first).sort_values(order, ascending=False, kind="stable")
-    found = found.loc[found["flagged"]]
+    found = found.loc[found["flagged"]].astype(object).replace({np.nan: None})
+    names = ["gear", "zero_N", "noise_sd_N", "loop_N", "bend_N"]
     return tuple(
         Flagged(
-            gear=row["gear"],
+            **{name: row[name] for name in names},
             quantities={n: row[f"off_{n}"] for n in row["flagged_in"].split(", ")},
             apart_percent=Interval(
                 median=row["apart_percent"], lo=row["apart_lo"], hi=row["apart_hi"]
             ),
-            zero_N=row["zero_N"],
-            noise_sd_N=row["noise_sd_N"],
-            loop_N=None if np.isnan(row["loop_N"]) else row["loop_N"],
-            bend_N=None if np.isnan(row["bend_N"]) else row["bend_N"],
         )
         for row in found.to_dict("records")
     )
 
 
-def false_discovery_rate(table: pd.DataFrame) -> float | None:
+def false_discovery_rate(fit: FittedFleet) -> float | None:
     """Return the expected share of flagged quantities of gears that are ordinary."""
-    odd = table[[f"off_{name}" for name in QUANTITIES]].to_numpy()
-    rate = 1.0 - odd[1.0 - odd <= MOST_FALSE]
+    each = [1.0 - fit.gears[f"off_{n}"][fit.flagged(n)] for n in QUANTITIES]
+    rate = np.concatenate(each)
     return float(rate.mean()) if rate.size else None
 
 

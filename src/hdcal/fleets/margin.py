@@ -1,7 +1,6 @@
 """Margin of a fleet: the force that gears to come need at a deformation."""
 
 import math
-from collections.abc import Iterator
 from typing import Literal
 
 from hdcal.data.theory_names import SPRING
@@ -20,11 +19,7 @@ from hdcal.report.result import Result
 
 
 class FleetMargin(NextForce, Result):
-    """The force of gears to come, from the population of a fleet.
-
-    Attributes:
-        fleet: its gears, data and settings.
-    """
+    """The force of gears to come, from the population of a fleet."""
 
     template = "fleets/margin.md.j2"
     table = "bounds"
@@ -61,7 +56,12 @@ def fleet_margin(
     with Findings() as wrong:
         given = deformation, limit_force, facts.largest_mm, reach, units
         wrong += force_findings(*given)
-        wrong += _share_findings(content, confidence, len(draws["stiffness"]))
+        shares = {"confidence": confidence}
+        shares |= {} if content is None else {"content": content}
+        wrong += share_findings(shares, len(draws["stiffness"]))
+        if content is not None and 0.0 < content <= 0.5:
+            words = f"{content:g} is no more than half of the gears to come"
+            wrong.append(Finding("content", words, "Ask for more than 0.5"))
     if posterior.reasons:
         raise NotUsable("this fleet failed its checks: " + "; ".join(posterior.reasons))
     found = next_force(
@@ -75,14 +75,3 @@ def fleet_margin(
     )
     part = "part" if facts.theory == SPRING else "gear"
     return FleetMargin(**dict(found), fleet=facts, part=part, units=units)
-
-
-def _share_findings(
-    content: float | None, confidence: float, draws: int
-) -> Iterator[Finding]:
-    shares = {"confidence": confidence}
-    shares |= {} if content is None else {"content": content}
-    yield from share_findings(shares, draws)
-    if content is not None and 0.0 < content <= 0.5:
-        words = f"{content:g} is no more than half of the gears to come"
-        yield Finding("content", words, "Ask for more than 0.5")

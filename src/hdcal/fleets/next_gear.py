@@ -32,13 +32,7 @@ class Bounds(Item):
 
 
 class Mixture(NamedTuple):
-    """Normal components about one mean, for each draw of the population.
-
-    Attributes:
-        mean: shape (d,).
-        sd: of each component, shape (c, d).
-        weight: of each component, shape (c, d).
-    """
+    """Normal components about one mean, by population draw; (d,) and twice (c, d)."""
 
     mean: np.ndarray
     sd: np.ndarray
@@ -57,14 +51,10 @@ class Mixture(NamedTuple):
         return np.sum(self.weight * ndtr((self.mean - limit) / self.sd), axis=0)
 
     def bounds(self, content: float, confidence: float) -> Bounds:
-        """Return one-sided bounds of a share of the members, none below zero.
+        """Return one-sided bounds of a share above a half, none below zero.
 
-        Each holds with the confidence: in that share of the draws of the population it
-        leaves at least `content` of the members on its side.
-
-        Args:
-            content: the share, above a half.
-            confidence: of each bound.
+        In the share `confidence` of the draws of the population each bound leaves at
+        least `content` of the members on its side.
         """
 
         def excess(reach, *parts):
@@ -76,8 +66,12 @@ class Mixture(NamedTuple):
         reach = find_root(excess, ends, args=(*self.weight, *self.sd)).x
         low = float(np.quantile(self.mean - reach, 1.0 - confidence))
         high = float(np.quantile(self.mean + reach, confidence))
-        given = {"content": content, "confidence": confidence}
-        return Bounds(**given, at_least=max(low, 0.0), at_most=high)
+        return Bounds(
+            content=content,
+            confidence=confidence,
+            at_least=max(low, 0.0),
+            at_most=high,
+        )
 
 
 class NextGear(Item):
@@ -107,11 +101,7 @@ class NextForce(Item):
 
 
 def stiffness_of_gears(draws: Mapping[str, np.ndarray]) -> Mixture:
-    """Return the stiffness of gears to come [N/mm as read].
-
-    Args:
-        draws: of the population by site, shape (d,).
-    """
+    """Return the stiffness of gears to come [N/mm as read], by draws of all sites."""
     mean, share = draws["stiffness"], draws["off_share"]
     sd = mean * _relative_sd(draws)
     return Mixture(mean, sd, np.stack([1.0 - share, share]))
@@ -120,25 +110,20 @@ def stiffness_of_gears(draws: Mapping[str, np.ndarray]) -> Mixture:
 def force_of_gears(draws: Mapping[str, np.ndarray], deformation: float) -> Mixture:
     """Return the size of the force of one reading of each gear to come [N].
 
-    Args:
-        draws: of the population by site, shape (d,).
-        deformation: as read, with the sign of the data [mm].
+    The deformation is as read, with the sign of the data [mm].
     """
-    sense, size = np.sign(deformation) or 1.0, abs(deformation)
-    mean = draws["stiffness"] * size + sense * draws["zero"]
-    force = draws["stiffness"] * size
+    sense, force = np.sign(deformation) or 1.0, draws["stiffness"] * abs(deformation)
     rest = np.hypot(reading_sd(draws), force * new_group_sd(draws, "rig"))
     rest = np.hypot(rest, new_group_sd(draws, "operator"))
-    shares = draws["off_share"], draws["zero_off_share"]
-    zero_sd = draws["run_offset_sd"] * _wide(draws["zero_off_ratio"])
-    sd, weight = [], []
-    for odd, of_stiffness in enumerate(force * _relative_sd(draws)):
-        for odd_zero, of_zero in enumerate(zero_sd):
-            sd.append(np.sqrt(of_stiffness**2 + of_zero**2 + rest**2))
-            pairs = zip((odd, odd_zero), shares, strict=True)
-            each = [share if is_odd else 1.0 - share for is_odd, share in pairs]
-            weight.append(each[0] * each[1])
-    return Mixture(mean, np.stack(sd), np.stack(weight))
+    own = force * _relative_sd(draws)
+    zero = draws["run_offset_sd"] * _wide(draws["zero_off_ratio"])
+    # Ordinary and odd stiffness by ordinary and odd zero, [2, 2, draw].
+    sd = np.sqrt(own[:, None] ** 2 + zero**2 + rest**2)
+    odd, odd_zero = draws["off_share"], draws["zero_off_share"]
+    weight = np.stack([1.0 - odd, odd])[:, None] * np.stack([1.0 - odd_zero, odd_zero])
+    flat = 4, len(force)
+    mean = force + sense * draws["zero"]
+    return Mixture(mean, sd.reshape(flat), weight.reshape(flat))
 
 
 def next_gear(draws: Mapping[str, np.ndarray], seed: int) -> NextGear:
@@ -168,7 +153,7 @@ def next_force(
         limit_force: a capacity, its size [N].
         tested: largest deformation that was read [mm].
         seed: of the predictive draws.
-        contents: shares of gears to come of the bounds, above a half each.
+        contents: shares of gears to come, above a half each.
         confidence: of each bound.
     """
     gears = force_of_gears(draws, deformation)
@@ -191,14 +176,9 @@ def force_findings(
     reach: float,
     units: Quantities,
 ) -> list[Finding]:
-    """Return what is wrong with a deformation and a capacity.
+    """Return what is wrong with a deformation (None: no force is asked) and a capacity.
 
-    Args:
-        deformation: as read [mm]; None if no force is asked for.
-        limit_force: the capacity, its size [N].
-        largest: deformation that was read [mm].
-        reach: deformation that no gear of this radius reaches [mm].
-        units: names and units of what was measured.
+    The largest deformation was read; no gear of this radius reaches `reach` [mm].
     """
     wrong = implausible("limit_force", limit_force, "sigma")
     if deformation is None:
@@ -222,10 +202,6 @@ def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
 
     This mean has an error itself: the sd of one group over the root of their number.
     The result is zero without such groups.
-
-    Args:
-        draws: of the population by site, shape (d,).
-        kind: lot, operator or rig.
     """
     if f"{kind}_sd" not in draws:
         return np.zeros(1)

@@ -34,7 +34,6 @@ class FleetFacts(Item):
         largest_mm: largest deformation that was read, with its sign.
         reach_mm: deformation as read that no gear of this radius reaches.
         at_one_size: whether gears of several sizes were compared at the gear file's.
-        notes: of the fleet, for the reader of its margins.
     """
 
     name: str
@@ -57,10 +56,8 @@ class FleetFacts(Item):
 class FleetPosterior:
     """Population of a fleet.
 
-    Attributes:
-        tree: in the group posterior the draws of the population by site, in the group
-            predictions the stiffness of a gear to come [N/mm as read]; chains by draws.
-        facts: gears, data, checks and settings.
+    The tree holds the draws of the population by site in the group posterior, and the
+    stiffness of a gear to come [N/mm as read] in the group predictions.
     """
 
     tree: xr.DataTree
@@ -88,13 +85,7 @@ class FleetPosterior:
     def margin(
         self, deformation: float, limit_force: float | None = None, **shares: float
     ) -> "FleetMargin":
-        """Return the force of gears to come at a deformation.
-
-        Args:
-            deformation: as read, with the sign of the data [mm].
-            limit_force: a capacity, its size [N].
-            shares: content and confidence of the bounds, as `fleet_margin` takes them.
-        """
+        """Return the force of gears to come, as `hdcal.fleets.margin.fleet_margin`."""
         from hdcal.fleets.margin import fleet_margin
 
         return fleet_margin(self, deformation, limit_force, **shares)
@@ -113,10 +104,7 @@ class FleetPosterior:
 
     @classmethod
     def load(cls, path: Path | str) -> "FleetPosterior":
-        """Read the posterior of a fleet.
-
-        Args:
-            path: a result folder of a fleet, or its posterior.nc.
+        """Read the posterior of a fleet from its result folder, or its posterior.nc.
 
         Raises:
             InputError: the file is missing, damaged, changed, from another version or
@@ -139,18 +127,14 @@ class FleetPosterior:
         drawn = {name: v.reshape(chains, -1) for name, v in fit.draws.items()}
         units = {name: fleet.units.unit(_unit(name)) for name in drawn}
         population = dataset(drawn, units=units)
-        names = {"lot": fit.lots, "operator": fit.operators, "rig": fit.rigs}
-        for kind, labels in names.items():
-            for place, label in enumerate(labels, 1):
+        for kind in ("lot", "operator", "rig"):
+            for place, label in enumerate(getattr(fit.groups, f"{kind}s"), 1):
                 population[f"{kind}_{place}"].attrs["long_name"] = label
         ahead = stiffness_of_gears(fit.draws).sample(fleet.seed).reshape(chains, -1)
         predicted = dataset({"stiffness": ahead}, units=units)
-        reach = case.gear.reach
-        same = {
-            n: getattr(fleet, n) for n in FleetFacts.model_fields if hasattr(fleet, n)
-        }
+        reach, names = case.gear.reach, FleetFacts.model_fields
         facts = FleetFacts(
-            **same,
+            **{name: getattr(fleet, name) for name in names if hasattr(fleet, name)},
             theory=case.gear.theory,
             load=case.units.load,
             largest_mm=fleet.readings.largest,

@@ -1,6 +1,5 @@
 """A fleet as a result: population, odd gears, and gears to come."""
 
-import shlex
 from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,20 +11,13 @@ from pydantic import Field, InstanceOf, computed_field
 from hdcal.data.gear_file.certificates import GAINS
 from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.tables.cells import NOT_STATED
-from hdcal.data.theory_names import SPRING
-from hdcal.fleets.charts import (
-    curves_chart,
-    gears_chart,
-    scatter_chart,
-    time_chart,
-)
+from hdcal.fleets.charts import curves_chart, gears_chart, time_chart
 from hdcal.fleets.gauge import GaugeRR
 from hdcal.fleets.gear_table import Flagged, GearLeftOut, with_left_out
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
-from hdcal.fleets.model.groups import linked_rigs
+from hdcal.fleets.model.groups import rigs_are_linked
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.model.priors import population_priors
-from hdcal.fleets.model.quantities import FleetGroups
 from hdcal.fleets.next_gear import NextForce, NextGear
 from hdcal.fleets.over_time import Change
 from hdcal.fleets.posterior import FleetPosterior
@@ -60,15 +52,11 @@ class Population(Item):
     Attributes:
         stiffness_N_per_mm: of the centre of ordinary gears, per mm as read.
         gear_sd_percent: between ordinary gears of a lot.
-        lot_sd_percent: between lots, if lots are distinguished.
-        rig_sd_percent: between the gains of rigs, likewise.
-        operator_sd_N: between the zeros of operators, likewise.
-        mounting_sd_N: between the zeros of mountings.
+        lot_sd_percent: between lots, if lots are distinguished; likewise rigs (of
+            their gains) and operators (of their zeros).
         reading_sd_N: noise of the readings of ordinary gears.
-        zero_N: mean zero.
         loop_N: force of loading above unloading, of ordinary gears.
         bend_N: how far the middle of the curve lies below the chord, likewise.
-        correlation: of the noise of neighbouring readings.
     """
 
     stiffness_N_per_mm: Interval = quantity("stiffness of the centre", "N/mm")
@@ -91,7 +79,6 @@ class Group(Item):
         members: gears of a lot, or mountings.
         value: stiffness of a lot, zero of an operator relative to the mean of all of
             them, or likewise the gain of a rig.
-        unit: of the value.
     """
 
     name: Words
@@ -104,10 +91,8 @@ class Fleet(Result):
     """Gears of one kind: their population, and the gears that are odd.
 
     Attributes:
-        name: of the data.
         gears: number of gears, without those left out.
         rows: readings of these.
-        left_out: gears that are in none of the numbers.
         flagged: gears that are odd with a probability of `least_probability_off` or
             more, those in their stiffness first.
         false_discovery_rate: expected share of ordinary ones among all that is flagged.
@@ -116,7 +101,6 @@ class Fleet(Result):
         lots: that are distinguished; operators and rigs likewise.
         next_force: of a gear to come, if a deformation was given.
         over_time: changes with the date, if there are dates.
-        sampling: settings of the samplers.
         fit: posterior of the population and of all gears.
         readings: of all gears, at the sizes of the gear file.
         gear_table: one row a gear, as in gears.csv.
@@ -152,14 +136,13 @@ class Fleet(Result):
     gear_table: InstanceOf[pd.DataFrame] = Field(exclude=True)
 
     @computed_field
-    @property
+    @cached_property
     def notes(self) -> tuple[Words, ...]:
         """What the reader must know, first of the data, then of the model."""
         case = self.readings.case
-        said = tuple(map(self.units.say, case.notes))
         out = case.left_out
         left_out = (left_out_words(out, len(out) + self.gears),) if out else ()
-        return (*left_out, *self.lines("notes"), *said)
+        return (*left_out, *self.lines("notes"), *map(self.units.say, case.notes))
 
     @cached_property
     def posterior(self) -> FleetPosterior:
@@ -187,12 +170,8 @@ class Fleet(Result):
         return self.posterior.tree
 
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return the gears, their readings, the scatter, and changes with the date."""
-        charts = {
-            "gears": gears_chart(self),
-            "curves": curves_chart(self),
-            "scatter": scatter_chart(self),
-        }
+        """Return the gears, their readings, and changes with the date."""
+        charts = {"gears": gears_chart(self), "curves": curves_chart(self)}
         return charts | ({"time": time_chart(self)} if self.over_time else {})
 
     # What the template needs.
@@ -210,33 +189,19 @@ class Fleet(Result):
         found, unit = self.population, self.units.load_unit
         force = found.stiffness_N_per_mm.median * abs(self.gauge_rr.deformation_mm)
         sources = (
-            ("lots", found.lot_sd_percent, "%"),
-            (f"{self.part}s", found.gear_sd_percent, "%"),
-            ("gains of rigs", found.rig_sd_percent, "%"),
-            ("zeros of operators", found.operator_sd_N, unit),
-            ("zeros of mountings", found.mounting_sd_N, unit),
-            ("single readings", found.reading_sd_N, unit),
+            ("lots", found.lot_sd_percent, "%", 0.01 * force),
+            (f"{self.part}s", found.gear_sd_percent, "%", 0.01 * force),
+            ("gains of rigs", found.rig_sd_percent, "%", 0.01 * force),
+            ("zeros of operators", found.operator_sd_N, unit, 1.0),
+            ("zeros of mountings", found.mounting_sd_N, unit, 1.0),
+            ("single readings", found.reading_sd_N, unit, 1.0),
         )
-        return [
-            (source, sd, unit, 0.01 * force if unit == "%" else 1.0)
-            for source, sd, unit in sources
-            if sd is not None
-        ]
+        return [(s, sd, unit, one) for s, sd, unit, one in sources if sd is not None]
 
     @property
     def alike(self) -> int:
         """Number of gears that are not flagged in their stiffness."""
         return self.gears - sum("stiffness" in one.quantities for one in self.flagged)
-
-    @property
-    def shell_names(self) -> dict[str, str]:
-        """Names of flagged gears as a shell takes them."""
-        return {one.gear: shlex.quote(one.gear) for one in self.flagged}
-
-    @property
-    def has_sizes(self) -> bool:
-        """Whether the theory follows the sizes of the gear."""
-        return self.readings.case.gear.theory != SPRING
 
     @property
     def mounted_once(self) -> bool:
@@ -254,26 +219,20 @@ class Fleet(Result):
         expected = population_priors(self.readings.case)[1]["stiffness"]
         middle, log_sd = map(float, expected.numbers)
         ratio = self.population.stiffness_N_per_mm.median / middle
-        far = self.has_sizes and abs(np.log(ratio)) > _FAR * log_sd
+        far = self.part == "gear" and abs(np.log(ratio)) > _FAR * log_sd
         return (ratio, middle) if far else None
 
     @property
     def groups(self) -> dict[str, tuple[int, int, bool]]:
         """Numbers of labels and of distinguished groups, and whether some lack one."""
-        case, fit = self.readings.case, self.fit
-        each = {
-            "lots": (case.lots, fit.lots),
-            "operators": (case.operators, fit.operators),
-            "rigs": (case.rigs, fit.rigs),
-        }
-        return {
-            kind: (len(set(labels)), len(names), NOT_STATED in names)
-            for kind, (labels, names) in each.items()
-        }
+        found = {}
+        for kind in ("lots", "operators", "rigs"):
+            labels = getattr(self.readings.case, kind)
+            names = getattr(self.fit.groups, kind)
+            found[kind] = len({*labels}), len(names), NOT_STATED in names
+        return found
 
     @property
     def rigs_are_linked(self) -> bool:
         """Whether gears that several rigs measured compare all of the rigs."""
-        sums = self.readings.sums
-        rig = FleetGroups.of(self.readings.case, sums.run).rig
-        return len(np.unique(linked_rigs(sums.gear, rig))) == 1
+        return rigs_are_linked(self.readings.sums.gear, self.fit.groups.rig)

@@ -6,62 +6,77 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import FORCE, Parsed, read_columns, read_tones
+from hdcal.cli.option_types import FORCE, read_columns
 from hdcal.cli.options import json_option, repeated_option, seed_option
 from hdcal.errors import Finding
 
 
-@command(short_help="How a calibrated gear moves under a force over time.")
+@command(short_help="Predict the motion of a gear under a force over time.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--force",
     required=True,
-    metavar="F.csv|step|sine|chirp",
-    help="The force on the gear: a table with time_s and force_N, or a shape.",
+    metavar="F.csv|step",
+    help="Apply this force: a table with time_s and force_N, or a step.",
 )
 @repeated_option(
     "--column",
     "columns",
     metavar="QUANTITY=HEADER",
     read=read_columns,
-    help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
-)
-@click.option("--amplitude", type=FORCE, help="Of a shape [N] [default: 80].")
-@click.option(
-    "--frequency",
-    type=Parsed("HZ", read_tones),
-    help="Of a sine [Hz]: 5; of a chirp its first and last: 5:200.",
+    help="Read a quantity of F.csv from a column: force=Load[kgf].",
 )
 @click.option(
-    "--duration", type=float, metavar="S", help="Of a shape [s] [default: 0.5]."
+    "--amplitude", type=FORCE, help="Set the amplitude of a step [N] [default: 80]."
 )
-@click.option("--temperature", type=float, help="Of the gear [°C] [default: tested].")
-@click.option("--mass-kg", "mass", type=float, help="Moved mass [default: prior].")
-@click.option("--damping", type=float, help="Damping c [N·s/mm] [default: prior].")
-@click.option("--points", default=1001, show_default=True, help="Times to answer at.")
-@click.option("--draws", default=500, show_default=True, help="Gears to integrate.")
+@click.option(
+    "--duration",
+    type=float,
+    metavar="S",
+    help="Set the duration of a step [s] [default: 0.5].",
+)
+@click.option(
+    "--temperature",
+    type=float,
+    help="Set the temperature of the gear [°C] [default: the tested one].",
+)
+@click.option(
+    "--mass-kg",
+    "mass",
+    type=float,
+    help="Set the moved mass [kg] [default: its prior].",
+)
+@click.option(
+    "--damping", type=float, help="Set the damping c [N·s/mm] [default: its prior]."
+)
+@click.option(
+    "--points", default=1001, show_default=True, help="Predict at so many times."
+)
+@click.option(
+    "--draws", default=500, show_default=True, help="Integrate so many draws."
+)
 @seed_option
 @click.option(
-    "--out", metavar="DIR", help="Result folder to make [default: RUN-response]."
+    "--out", metavar="DIR", help="Write the result to DIR [default: RUN-response]."
 )
-@click.option("--replace", is_flag=True, help="Replace an older result of hdcal.")
+@click.option("--replace", is_flag=True, help="Replace an older result.")
 @json_option
 @click.pass_obj
 def respond(console: Console, run, force, columns, out, replace, **asked):
-    """Predict how the gear of RUN, a result folder, deforms under a force over time.
+    """Predict the deformation over time of the gear of RUN, a result folder.
 
-    Units: N, mm, s, Hz, kg, N·s/mm. Motion begins at rest.
+    Units are N, mm, s, kg, N·s/mm. The motion begins at rest.
     """
     from hdcal.data.measurements.force_table import read_force
     from hdcal.inference.model_average import load_models
-    from hdcal.motion.drive import SHAPES
     from hdcal.motion.dynamic_problem import DynamicPosterior
+    from hdcal.motion.respond import STEP
     from hdcal.motion.respond import respond as compute
 
     out, drive = out or f"{Path(run).resolve().name}-response", force
     with console.wrong as wrong:
         console.reserve_folder(out, replace, "replace")
-        if force not in SHAPES:
+        if force != STEP:
             drive = wrong.attempt(read_force, force, columns or {})
             if asked["amplitude"] is not None:
                 words = "a sampled force has its own"

@@ -50,8 +50,8 @@ def calibrate_dynamic(
 ) -> DynamicPosterior:
     """Calibrate m ÿ + c ẏ + k y = F(t) against a time series.
 
-    The force is the input, as read and linear between the rows; the deformation is the
-    output, y plus an offset plus white noise; k follows the temperature.
+    The force is exact and linear between the rows; the deformation is read with an
+    offset and white noise; k follows the temperature.
 
     Args:
         case: from `read_case`; one run, with time.

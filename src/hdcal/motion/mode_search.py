@@ -72,7 +72,7 @@ def _scan(problem: DynamicProblem) -> list[np.ndarray]:
 
 
 def _refined(problem: DynamicProblem, place: np.ndarray) -> np.ndarray:
-    """Return the top of a peak: frequency [Hz] and damping ratio."""
+    """Return frequency [Hz] and damping ratio at the top of a peak."""
     step = 0.5 * _FINENESS / (np.ptp(problem.time[: problem.count]) * place[0])
     simplex = np.log(place) + np.array([[0.0, 0.0], [step, 0.0], [0.0, 0.5]])
     options = {"initial_simplex": simplex, "fatol": _CLOSE, "xatol": np.inf}

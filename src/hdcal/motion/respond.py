@@ -4,7 +4,7 @@ Of a gear that was calibrated at rest the data determine the stiffness only; mas
 damping are drawn from their priors, which the result states.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import jax
@@ -16,19 +16,25 @@ from hdcal.data.case import require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import sample_prior
+from hdcal.inference.force_model.priors import without_scatter
 from hdcal.inference.force_model.problem import case_reading
+from hdcal.inference.posterior import Posterior
 from hdcal.motion.charts import response_chart
-from hdcal.motion.drive import Drive, Force, make_drive
 from hdcal.motion.dynamic_problem import mass_prior
-from hdcal.motion.gear_force import CalibratedGears, Models
-from hdcal.motion.integration import integrate_all
+from hdcal.motion.gears_in_motion import integrate_all, moving_draws
 from hdcal.physics.dynamics import acting, damping_ratio, natural_frequency
+from hdcal.physics.forcing import Forcing, SampledForce, Step
+from hdcal.prediction import conditions
+from hdcal.prediction.joint import JointModel, joint
+from hdcal.prediction.models import Models, averaging_words
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import INTERVAL, TAILS, Count, Interval, Item, Words, quantity
 from hdcal.report.provenance import gear_rows
 from hdcal.report.result import Result
 
-Driver = Literal["data", "prior", "given"]
+# A step, or times [s] and forces [N].
+Force = str | tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
+STEP, _DURATION = "step", 0.5
 # A longer motion takes minutes, and its band says nothing new.
 _MOST_SWINGS = 20_000
 # Points whose quantiles are computed together.
@@ -43,7 +49,7 @@ _BAND = (
 class Estimate(Interval):
     """A quantity, and whether data, a prior or the user determine it."""
 
-    driven_by: Driver
+    driven_by: Literal["data", "prior", "given"]
 
 
 class Estimates(Item):
@@ -64,7 +70,9 @@ class Response(Result):
     Attributes:
         motion: a row per time: force, ends and median of the pointwise band of the
             deformation as read from the unloaded gear, and whether it was tested.
-        gears: what was calibrated.
+        posterior: of the most probable model.
+        looped: whether the leftover differs between loading and unloading.
+        averaging: sentences about the models that are averaged over.
     """
 
     template = "motion/response.md.j2"
@@ -83,7 +91,9 @@ class Response(Result):
     draws: Count
     points: Count
     motion: pd.DataFrame = Field(exclude=True)
-    gears: InstanceOf[CalibratedGears] = Field(exclude=True)
+    posterior: InstanceOf[Posterior] = Field(exclude=True)
+    looped: bool = Field(exclude=True)
+    averaging: tuple[str, ...] = Field(exclude=True)
 
     @computed_field
     @property
@@ -100,8 +110,7 @@ class Response(Result):
     @property
     def facts(self) -> list[tuple[str, str]]:
         """The tested gear, as pairs of name and text."""
-        posterior = self.gears.posterior
-        return gear_rows(posterior.case, posterior.theory)
+        return gear_rows(self.posterior.case, self.posterior.theory)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the motion, a row per time."""
@@ -117,7 +126,6 @@ def respond(
     force: Force,
     *,
     amplitude: float = 80.0,
-    frequency: float | Sequence[float] | None = None,
     duration: float | None = None,
     temperature: float | None = None,
     mass: float | None = None,
@@ -132,10 +140,9 @@ def respond(
 
     Args:
         models: from `calibrate`, `diagnose` or `calibrate_dynamic`.
-        force: `step`, `sine`, `chirp`, or a pair of times [s] and forces [N].
-        amplitude: of a named shape, of either sign [N].
-        frequency: of a sine, or first and last of a chirp [Hz].
-        duration: of a named shape [s]; 0.5 by default.
+        force: `step`, or a pair of times [s] and forces [N], linear between them.
+        amplitude: of a step, of either sign [N].
+        duration: of a step [s]; 0.5 by default.
         temperature: of the gear [°C]; by default the tested one nearest to the
             reference.
         mass: moved mass, if known [N·s²/mm]; 1 kg = 1e-3 N·s²/mm.
@@ -149,36 +156,97 @@ def respond(
             integrated.
         InputError: a setting is out of range.
     """
-    gears, given = CalibratedGears(models), {"mass": mass, "damping": damping}
-    require_force(gears.posterior.case, "respond")
+    gears, given = joint(models), {"mass": mass, "damping": damping}
+    case, dynamic = gears.posterior.case, gears.posterior.kind == "dynamic"
+    require_force(case, "respond")
+    at = conditions.usual_temperature(case) if temperature is None else temperature
     with Findings() as wrong:
-        asked = force, amplitude, frequency, duration, points
-        drive = wrong.attempt(make_drive, *asked)
-        at = wrong.attempt(gears.temperature, temperature)
+        wrong += _force_findings(force, amplitude, duration, points)
+        levels = np.array([at])
+        wrong += conditions.temperature_findings(case.gear, gears.draws, levels)
         wrong += implausible("draws", draws, "gears") + implausible("seed", seed)
         for name, value in given.items():
             wrong += implausible(name, value)
-            if gears.moving and value is not None:
+            if dynamic and value is not None:
                 words = "this calibration of the moving gear determines it"
                 wrong.append(Finding(name, words, "Leave it out"))
-    assert drive is not None and at is not None
-    values = gears.draw(draws, seed)
+    if isinstance(force, str):
+        drive, times = Step(amplitude), np.linspace(0.0, duration or _DURATION, points)
+    else:
+        drive = SampledForce(*(np.asarray(part, float) for part in force))
+        times = np.linspace(drive.time[0], drive.time[-1], points)
+    values = moving_draws(joint(models, draws), seed)
     m, c, k = _coefficients(gears, values, at, given, seed)
-    _check_reach(gears, drive, m, k)
-    deformation, peak = integrate_all(gears, drive, at, values, m, c)
+    _check_reach(case.gear.reach, drive, times, m, k)
+    about = {"force": drive, "times": times, "temperature": at}
+    deformation, peak = integrate_all(gears, values, m, c, **about)
     # Quantiles are computed of a copy: part by part it takes little memory.
     parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
     band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
-    estimates = _estimates(gears, given, m, c, k, peak)
-    return _response(gears, drive, at, band, estimates, len(m))
+    kept, left = acting(without_scatter(gears.effects))
+    motion = pd.DataFrame(
+        {
+            "time_s": times,
+            "force_N": jax.vmap(drive)(times),
+            **dict(zip(_COLUMNS, band, strict=True)),
+            "tested": _tested(gears, at, band[0], band[2]),
+        }
+    )
+    fitted = None if dynamic else gears.problem.discrepancy
+    return Response(
+        units=case.units,
+        gear=case.gear.name,
+        calibration="moving" if dynamic else "at rest",
+        force=drive.words(),
+        temperature_C=at,
+        estimates=_estimates(gears.posterior, given, m, c, k, peak),
+        tested_share=motion.tested.mean(),
+        effects=tuple(effect.name for effect in kept),
+        left_out=tuple(e.name for e in left if e.stage != "noise"),
+        draws=len(m),
+        points=points,
+        motion=motion,
+        posterior=gears.posterior,
+        looped=fitted is not None and fitted.looped,
+        averaging=tuple(averaging_words(models)),
+    )
 
 
-def _coefficients(gears: CalibratedGears, values, at: float, given, seed: int):
+def _force_findings(
+    force: Force, amplitude: float, duration: float | None, points: int
+) -> Iterator[Finding]:
+    yield from implausible("points", points)
+    if isinstance(force, str):
+        yield from implausible("amplitude", amplitude)
+        yield from implausible("duration", duration)
+        if amplitude == 0.0:
+            yield Finding("amplitude", "0 drives nothing", "Give a force in N")
+        if force != STEP:
+            words = f"'{force}' is not a known force"
+            yield Finding("force", words, f"Use {STEP} or a table")
+        return
+    if duration is not None:
+        words = "a sampled force has its own duration"
+        yield Finding("duration", words, "Leave it out")
+    times, forces = (np.asarray(part, float) for part in force)
+    if times.shape != forces.shape or times.ndim != 1 or len(times) < 2:
+        words = "needs as many times as forces, two or more"
+        yield Finding("force", words, "Correct the table")
+    elif wrong := implausible("force", forces) + implausible("force", times, "time"):
+        words = f"the table holds {wrong[0].problem}"
+        yield Finding("force", words, "Correct the table")
+    elif np.any(np.diff(times) <= 0.0):
+        yield Finding("force", "has times that do not rise", "Put them in order")
+    elif not np.any(forces):
+        yield Finding("force", "is zero throughout", "Give a force in N")
+
+
+def _coefficients(gears: JointModel, values, at: float, given, seed: int):
     """Return mass, damping and stiffness of each draw at a temperature [°C]."""
     case, count = gears.posterior.case, len(values["K"])
     k = values["stiffness"]
     k = k * (1.0 - values["alpha"] * (at - case.gear.reference_temperature))
-    if gears.moving:
+    if gears.posterior.kind == "dynamic":
         m, ratio = values["mass"], values["damping_ratio"]
         return m, 2.0 * ratio * np.sqrt(k * m), k
     rng, m, c = np.random.default_rng(seed), given["mass"], given["damping"]
@@ -192,14 +260,14 @@ def _coefficients(gears: CalibratedGears, values, at: float, given, seed: int):
     return np.full(count, m), np.full(count, c), k
 
 
-def _check_reach(gears: CalibratedGears, drive: Drive, m, k) -> None:
+def _check_reach(reach: float, drive: Forcing, times, m, k) -> None:
     """Refuse a wrong unit: a force that folds the gear, or a motion of hours."""
     with Findings() as wrong:
-        static = float(drive.force.largest()) / np.median(k)
-        if static >= gears.posterior.case.gear.reach:
+        static = float(drive.largest()) / np.median(k)
+        if static >= reach:
             words = f"would deform the gear by {static:.3g} mm even at rest"
             wrong.append(Finding("force", words, "Give the force in N"))
-        seconds = float(np.ptp(drive.times))
+        seconds = float(np.ptp(times))
         swings = seconds * float(np.max(natural_frequency(m, k)))
         if swings > _MOST_SWINGS:
             words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
@@ -207,11 +275,21 @@ def _check_reach(gears: CalibratedGears, drive: Drive, m, k) -> None:
             wrong.append(Finding("duration", words, remedy))
 
 
-def _estimates(gears: CalibratedGears, given, m, c, k, peak) -> Estimates:
+def _tested(gears: JointModel, temperature: float, low, high) -> np.ndarray:
+    """Return where the deformation of a band [mm] and a temperature were tested."""
+    records, slack = gears.posterior.case.records, conditions.NEAR_MM
+    # Motion begins at the unloaded gear.
+    offset = np.median(gears.draws["deformation_offset"])
+    reached = np.append(records.deformation - offset, 0.0)
+    inside = (low >= reached.min() - slack) & (high <= reached.max() + slack)
+    return inside & conditions.temperature_is_tested(records, temperature)
+
+
+def _estimates(posterior: Posterior, given, m, c, k, peak) -> Estimates:
     """Return the quantities, and what determines them."""
-    found = {n: one.driven_by for n, one in gears.posterior.diagnoses.items()}
+    found = {n: one.driven_by for n, one in posterior.diagnoses.items()}
     by: dict[str, Any] = {"k": found.get("K", "prior")}
-    if gears.moving:
+    if posterior.kind == "dynamic":
         names = {"m": "mass", "c": "damping_ratio"}
         by |= {n: found.get(name, "prior") for n, name in names.items()}
     else:
@@ -235,33 +313,4 @@ def _estimates(gears: CalibratedGears, given, m, c, k, peak) -> Estimates:
         mass_kg=estimate(1e3 * m, "m"),
         stiffness_N_per_mm=estimate(k, "k"),
         peak_mm=estimate(peak, "mck"),
-    )
-
-
-def _response(
-    gears: CalibratedGears, drive: Drive, at: float, band, estimates, count: int
-) -> Response:
-    kept, left = acting(gears.effects)
-    motion = pd.DataFrame(
-        {
-            "time_s": drive.times,
-            "force_N": jax.vmap(drive.force)(drive.times),
-            **dict(zip(_COLUMNS, band, strict=True)),
-            "tested": gears.tested(at, band[0], band[2]),
-        }
-    )
-    return Response(
-        units=gears.posterior.case.units,
-        gear=gears.posterior.case.gear.name,
-        calibration="moving" if gears.moving else "at rest",
-        force=drive.force.words(),
-        temperature_C=at,
-        estimates=estimates,
-        tested_share=motion.tested.mean(),
-        effects=tuple(effect.name for effect in kept),
-        left_out=tuple(e.name for e in left if e.stage != "noise"),
-        draws=count,
-        points=len(motion),
-        motion=motion,
-        gears=gears,
     )

@@ -42,7 +42,7 @@ def parameter(
 ) -> Any:
     """Declare a field of an effect as a parameter."""
     return dataclasses.field(
-        metadata={"parameter": Parameter(unit, meaning, typical, null)},
+        metadata={"parameter": Parameter(unit, meaning, typical, null)}
     )
 
 

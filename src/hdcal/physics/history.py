@@ -88,9 +88,7 @@ def fading(
 
 
 def stop_cells(
-    deformation: Float[Array, " n"],
-    run: Int[Array, " n"],
-    reach: Float[Array, " c"],
+    deformation: Float[Array, " n"], run: Int[Array, " n"], reach: Float[Array, " c"]
 ) -> Float[Array, "c n"]:
     """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
 

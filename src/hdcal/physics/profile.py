@@ -36,10 +36,7 @@ class Profile(eqx.Module):
 
 
 def ring_profile(
-    geometry: Geometry,
-    modulus: Scalar,
-    deformation: Scalar,
-    angle: Float[Array, " n"],
+    geometry: Geometry, modulus: Scalar, deformation: Scalar, angle: Float[Array, " n"]
 ) -> Profile:
     """Compute shape, moment and stress of a ring deformed by two opposed loads.
 

@@ -1,4 +1,4 @@
-"""Conditions of a force: deformation, temperature, direction; and what was tested."""
+"""Conditions and population of a force, and what the readings tested."""
 
 import math
 from collections.abc import Mapping
@@ -12,12 +12,17 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Records
 from hdcal.errors import Finding
+from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.values import Values
 from hdcal.prediction.forces import Quantity
+from hdcal.prediction.joint import JointModel
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 SENSE = {"up": 1.0, "down": -1.0}
+# Members whose forces differ.
+Population = Literal["readings", "mountings", "specimens"]
+POPULATIONS: tuple[Population, ...] = get_args(Population)
 # How far beyond the data still counts as tested: thermometers are no better [K], and
 # a deformation is compared with itself as it was written [mm].
 NEAR_K, NEAR_MM = 1.0, 1e-9
@@ -99,21 +104,38 @@ def beyond_tested(deformation: float, records: Records) -> float:
     return beyond / (high - low) if beyond > NEAR_MM else 0.0
 
 
-def direction_of_loading(models, deformation: float) -> int:
+def direction_of_loading(model: JointModel, deformation: float) -> Literal[1, -1]:
     """Return +1 where the gear is pressed at a deformation, -1 where it is pulled.
 
     It is the sign of the gear's own deformation, the zero of the gauge taken off, in
     the larger share of the draws.
-
-    Args:
-        models: with their probabilities.
-        deformation: as read [mm].
     """
-    pressed = sum(
-        model.probability * np.mean(model.draws["deformation_offset"] <= deformation)
-        for model in models
-    )
+    pressed = np.mean(model.draws["deformation_offset"] <= deformation)
     return 1 if pressed >= 0.5 else -1
+
+
+def widest(problem: Problem) -> Population:
+    """Return the widest population of which the data hold two members or more."""
+    if problem.specimens >= 2:
+        return "specimens"
+    return "mountings" if problem.runs >= 2 else "readings"
+
+
+def population_findings(asked: str, problem: Problem) -> list[Finding]:
+    """Return why the data cannot describe a population; empty where they can."""
+    if asked not in POPULATIONS:
+        words = f"'{asked}' is unknown"
+        return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
+    what, count = {
+        "readings": ("", 2),
+        "mountings": ("mounting (run)", problem.runs),
+        "specimens": ("gear (specimen)", problem.specimens),
+    }[asked]
+    if count >= 2:
+        return []
+    words = f"the data hold one {what}, which does not show how much others differ"
+    remedy = f"Measure two or more, or ask about {widest(problem)}"
+    return [Finding("population", words, remedy)]
 
 
 def usual_temperature(case: Case) -> float:
@@ -129,14 +151,7 @@ def usual_sd(records: Records) -> float:
 
 
 def is_tested(records: Records, *, deformation, temperature, sense) -> np.ndarray:
-    """Return where the data hold a deformation, a temperature and a direction.
-
-    Args:
-        records: the data.
-        deformation: in the same terms as the data [mm].
-        temperature: of the specimen [°C].
-        sense: of the movement, +1 or −1.
-    """
+    """Return where the data hold a deformation [mm], a temperature [°C] and a sense."""
     return (
         _within(deformation, records.deformation, NEAR_MM)
         & temperature_is_tested(records, temperature)
@@ -197,20 +212,13 @@ def excluded_findings(case: Case, deformation: float, sense: float) -> list[Find
 
 
 def temperature_findings(
-    gear: Gear, values: Values, temperature: np.ndarray, name: str = "temperature"
+    gear: Gear, values: Values, temperature: np.ndarray
 ) -> list[Finding]:
-    """Return what is impossible about temperatures [°C].
-
-    Args:
-        gear: tells the reference.
-        values: draws by site.
-        temperature: at least one.
-        name: of the parameter.
-    """
-    if wrong := implausible(name, temperature, "temperature"):
+    """Return what is impossible about one or more temperatures [°C]."""
+    if wrong := implausible("temperature", temperature):
         return wrong
     rise = np.max(np.abs(temperature - gear.reference_temperature))
     if np.median(values["alpha"]) * rise >= _MOST_LOSS:
         words = "the linear law E(T) would change Young's modulus by half or more"
-        return [Finding(name, words, "Give it in °C")]
+        return [Finding("temperature", words, "Give it in °C")]
     return []

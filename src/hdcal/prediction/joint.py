@@ -1,4 +1,4 @@
-"""Draws of several models as those of one, for what needs one structure.
+"""Draws of several models of one case as those of one model, which answers all.
 
 The joint model has the effects of all models. An effect that a model lacks has its null
 value in the draws of that model, and each model has as many draws as it is probable.
@@ -7,25 +7,32 @@ value in the draws of that model, and each model has as many draws as it is prob
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
+from hdcal.data.full_scale import REFERENCE
+from hdcal.data.priors import effect_priors
+from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.priors import without_scatter
 from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
+from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.models import Model, Models, models_of
 
 # Sites of models with a leftover discrepancy and with correlated noise, null elsewhere.
 _AT_ZERO = ("gap_sd", "gap_weights", CORRELATION)
+# Drifts of the rig with temperature, by the effect whose prior states them.
+DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}
 
 
 @dataclass(frozen=True)
-class JointModel(Model):
+class JointModel:
     """Models of one case as one model with all their effects.
 
     Attributes:
-        models: the most probable first; its posterior has case and theory.
+        models: the most probable first.
         rows: of each model the draws that are taken.
     """
 
@@ -33,9 +40,16 @@ class JointModel(Model):
     rows: tuple[np.ndarray, ...]
 
     @property
+    def posterior(self) -> Posterior:
+        """That of the most probable model."""
+        return self.models[0].posterior
+
+    @property
     def effects(self) -> tuple[type[Effect], ...]:
         """Effects of all models, by name."""
-        named = {e.name: e for model in self.models for e in model.effects}
+        if len(self.models) == 1:
+            return self.posterior.effects
+        named = {e.name: e for m in self.models for e in m.posterior.effects}
         return tuple(named[name] for name in sorted(named))
 
     @cached_property
@@ -55,9 +69,19 @@ class JointModel(Model):
         given = {"theory": theory, "structure": structure}
         return build_problem(case, priors, self.effects, **given)
 
+    @property
+    def size(self) -> int:
+        """Number of draws."""
+        return sum(map(len, self.rows))
+
+    @property
+    def number(self) -> np.ndarray:
+        """Number of the model of each draw, (draw,)."""
+        return np.repeat(np.arange(len(self.rows)), [len(rows) for rows in self.rows])
+
     @cached_property
     def draws(self) -> dict[str, np.ndarray]:
-        """Parameters by site, model after model."""
+        """Parameters by site, model after model, without those of tested members."""
         nulls = dict.fromkeys(_AT_ZERO, 0.0) | {
             f"{effect.name}.{name}": spec.null
             for effect in without_scatter(self.effects)
@@ -84,14 +108,38 @@ class JointModel(Model):
                 parts.append(np.resize(first, (len(rows), *first.shape[1:])))
         return np.concatenate(parts)
 
-    def bend(self, place: np.ndarray, level: np.ndarray):
-        """Return mean and sd of the bend of each draw by its model [N]."""
+    def bend(self, place: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return mean and sd of the bend of each draw by its model [N], (draw, row).
+
+        Args:
+            place: deformation as read [mm], (row,).
+            level: selects a law of the bend by its probability, (draw,).
+        """
         ends = np.cumsum([len(rows) for rows in self.rows])[:-1]
         parts = [
             model.bend(place, part)
             for model, part in zip(self.models, np.split(level, ends), strict=True)
         ]
         return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
+
+    @cached_property
+    def drifts(self) -> dict[str, np.ndarray]:
+        """Mean and sd of DRIFTS [N/K, mm/K] of each draw, (2, draw) each.
+
+        By the priors of their effects, and none where a model has that effect.
+        """
+        case = self.posterior.case
+        # A frame expands by its own length, however short the stroke.
+        stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
+        priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
+        priors |= case.gear.effect_priors
+        found = {}
+        for name, effect in DRIFTS.items():
+            law = np.array(moments(priors[f"{effect}.slope"]))
+            names = [[e.name for e in m.posterior.effects] for m in self.models]
+            lacking = np.array([effect not in each for each in names])
+            found[name] = law[:, None] * lacking[self.number]
+        return found
 
     @property
     def independent_draws(self) -> float:
@@ -100,19 +148,33 @@ class JointModel(Model):
         total = sum(model.probability for model in self.models)
         return min(total**2 / least, self.size)
 
+    def driver(self, site: str) -> Literal["data", "prior"]:
+        """Return whether the data or the prior determine a parameter."""
+        found = self.posterior.diagnoses.get(site)
+        return "data" if found is not None and found.driven_by == "data" else "prior"
 
-def joint(models: Models, most: int | None = None) -> JointModel:
+    def take(self, places: np.ndarray) -> "JointModel":
+        """Return some of the draws, by ascending places."""
+        number, rows = self.number[places], np.concatenate(self.rows)[places]
+        each = tuple(rows[number == model] for model in range(len(self.models)))
+        return replace(self, rows=each)
+
+
+def joint(
+    models: Models, most: int | None = None, *, allow_failed: bool = False
+) -> JointModel:
     """Return models as one.
 
     Args:
         models: as in `models_of`.
         most: draws to take, evenly from every chain; all by default.
+        allow_failed: also calibrations that failed their checks.
 
     Raises:
         NotUsable: a calibration failed its checks.
         InputError: there are none, or they are not of the same data.
     """
-    return join(models_of(models), most)
+    return join(models_of(models, allow_failed=allow_failed), most)
 
 
 def join(models: Sequence[Model], most: int | None = None) -> JointModel:
@@ -125,4 +187,4 @@ def join(models: Sequence[Model], most: int | None = None) -> JointModel:
         count = max(round(size * model.probability / total), 1)
         places = np.linspace(0, model.size - 1, min(count, model.size))
         rows.append(places.round().astype(int))
-    return JointModel(1.0, models[0].posterior, tuple(models), tuple(rows))
+    return JointModel(tuple(models), tuple(rows))

@@ -1,9 +1,9 @@
 """Calibrated models with their probabilities, over which an answer averages."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
-from hdcal.physics.effect import Effect
 from hdcal.prediction.extrapolation import Bend, fit_bends
 from hdcal.report.words import hypothesis, percent
 
@@ -35,12 +34,7 @@ Models = Posterior | Averaged | Sequence[tuple[float, Posterior]]
 
 @dataclass(frozen=True)
 class Model:
-    """A calibrated model and its probability.
-
-    Attributes:
-        probability: of the model; those of all models of an answer sum to 1.
-        posterior: from `calibrate`.
-    """
+    """A calibrated model and its probability among all models of an answer."""
 
     probability: float
     posterior: Posterior
@@ -62,11 +56,6 @@ class Model:
         return len(self.draws["K"])
 
     @property
-    def weights(self) -> np.ndarray:
-        """Weight of each draw among those of all models."""
-        return np.full(self.size, self.probability / self.size)
-
-    @property
     def name(self) -> str:
         """Name among the hypotheses of a diagnosis."""
         effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
@@ -77,16 +66,6 @@ class Model:
     def bends(self) -> tuple[Bend, Bend]:
         """Bends that the readings leave possible, below and above their range."""
         return fit_bends(self.posterior)
-
-    @property
-    def effects(self) -> tuple[type[Effect], ...]:
-        """Effects in the model."""
-        return self.posterior.effects
-
-    @property
-    def noise_effects(self) -> set[str]:
-        """Names of the effects that describe the noise."""
-        return {effect.name for effect in self.effects if effect.stage == "noise"}
 
     def bend(self, place: np.ndarray, level: np.ndarray):
         """Return mean and sd of the bend of each draw [N], (draw, row) each.
@@ -119,11 +98,6 @@ class Model:
         """Effective number of draws in the tails of the parameters."""
         sizes = [found.ess_tail for found in self.posterior.diagnoses.values()]
         return min([self.size, *(size for size in sizes if np.isfinite(size))])
-
-    def driver(self, site: str) -> Literal["data", "prior"]:
-        """Return whether the data or the prior determine a parameter."""
-        found = self.posterior.diagnoses.get(site)
-        return "data" if found is not None and found.driven_by == "data" else "prior"
 
 
 def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
@@ -180,7 +154,7 @@ def models_of(models: Models, *, allow_failed: bool = False) -> tuple[Model, ...
     return tuple(sorted(kept, key=lambda model: -model.probability))
 
 
-def probabilities(models: Iterable[Model]) -> dict[str, float]:
+def probabilities(models: Sequence[Model]) -> dict[str, float]:
     """Return the probability of each hypothesis, the most probable first."""
     total: dict[str, float] = {}
     for model in models:
@@ -220,5 +194,6 @@ def joint_draws(models: Sequence[Model], site: str, count: int = 4000) -> np.nda
         count: number of draws.
     """
     values = np.concatenate([model.draws[site] for model in models])
-    ends = np.cumsum(np.concatenate([model.weights for model in models]))
+    weights = [np.full(model.size, model.probability / model.size) for model in models]
+    ends = np.cumsum(np.concatenate(weights))
     return values[np.searchsorted(ends / ends[-1], (np.arange(count) + 0.5) / count)]

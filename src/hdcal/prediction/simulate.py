@@ -5,30 +5,22 @@ designs and studies `gear_forces`, responses `gear_leftover`; streams that are t
 have the same bends, scores and drifts.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtri
 
-from hdcal.data.full_scale import REFERENCE
-from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
-from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.values import Values
-from hdcal.prediction.conditions import Conditions, usual_sd
+from hdcal.prediction.conditions import Conditions, Population, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
-from hdcal.prediction.members import Members, joined
-from hdcal.prediction.models import Model
-from hdcal.prediction.population import Population
+from hdcal.prediction.joint import DRIFTS, JointModel
+from hdcal.prediction.members import Members
 from hdcal.prediction.sizes import size_nodes
 
 # What the draws leave open about all members: standard normal scores of each draw, and
 # `law`, the level at which a law of the bend is selected.
 SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
-# Drifts of the rig with temperature, by the effect whose prior states them.
-DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}
 # Certified errors of gauges: inputs of their own, where a load is asked for.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
 # Parameters that are inputs of their own where the prior determines them; the zero of
@@ -37,16 +29,16 @@ SEPARATE = ("alpha", "force_offset")
 
 
 def simulate(
-    model: Model,
+    model: JointModel,
     at: Conditions,
     population: Population = "readings",
     *,
     seed: int = 0,
 ) -> Members:
-    """Return the forces of the members of a population in every draw of a model.
+    """Return the forces of the members of a population in every draw.
 
     Args:
-        model: whose posterior is simulated.
+        model: whose draws are simulated.
         at: conditions of the forces.
         population: members that differ from each other: readings of the tested gear and
             mounting, new mountings, or new gears (`specimens`) in new mountings.
@@ -99,7 +91,6 @@ def simulate(
     }
     common |= {"bend": at.loading * bend, "leftover": at.loading * left, **drift}
     return Members(
-        model.weights,
         share.reshape(count, -1),
         np.moveaxis(mean, 3, 1).reshape(count, at.size, -1),
         np.sqrt(np.moveaxis(variance, 3, 1)).reshape(count, at.size, -1),
@@ -109,7 +100,7 @@ def simulate(
 
 
 def gear_forces(
-    model: Model, at: Conditions, draws: Values | None = None, *, seed: int = 0
+    model: JointModel, at: Conditions, draws: Values | None = None, *, seed: int = 0
 ) -> np.ndarray:
     """Return the force of every draw on gears by themselves [N], (draw, row).
 
@@ -117,7 +108,7 @@ def gear_forces(
     drifts of a rig.
 
     Args:
-        model: whose posterior is simulated.
+        model: whose draws are simulated.
         at: with the quantity `gear`, and a factor on the stiffness where sizes or
             modulus are not the tested ones, (row,) or (draw, row).
         draws: other values of the parameters, such as those of another material.
@@ -130,14 +121,14 @@ def gear_forces(
 
 
 def gear_leftover(
-    model: Model, deformation: np.ndarray, *, seed: int = 0
+    model: JointModel, deformation: np.ndarray, *, seed: int = 0
 ) -> np.ndarray:
     """Return the force of a gear outside model and effects [N], (draw, row).
 
     The bend, and the fitted leftover as the mean of loading and unloading.
 
     Args:
-        model: whose posterior is simulated.
+        model: whose draws are simulated.
         deformation: from the free shape, per mm as read, (row,).
         seed: of the scores of what the draws leave open.
     """
@@ -155,22 +146,8 @@ def gear_leftover(
     return bend + np.mean([_forces(model, at, one, moved, acting)[4] for at in ways], 0)
 
 
-def simulate_all(
-    models: Sequence[Model],
-    at: Conditions,
-    population: Population = "readings",
-    *,
-    seed: int = 0,
-) -> Members:
-    """Return the forces of the members in every draw of several models, as `simulate`.
-
-    Each draw has the weight of its model; sources of scatter are left out.
-    """
-    return joined([simulate(model, at, population, seed=seed) for model in models])
-
-
 def _forces(
-    model: Model, at: Conditions, factor, moved, acting, draws: Values | None = None
+    model: JointModel, at: Conditions, factor, moved, acting, draws=None
 ) -> tuple[np.ndarray, ...]:
     """Return what `forces_of_draws` does."""
     path = _path(at, model.posterior.case.records)
@@ -217,19 +194,19 @@ def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
     return {n: level if n == "law" else ndtri(level) for n, level in levels.items()}
 
 
-def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
+def _bend(model: JointModel, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
     """Return the bend of each draw [N], and the share of the fitted leftover that acts.
 
     Shapes (draw, row) and (row,). A bend that is drawn from its prior is drawn along
     the direction of loading, so that mirrored data have the mirrored answer.
     """
-    place = at.deformation
+    place, main = at.deformation, model.models[0]
     if at.quantity == "gear":
         free = float(np.mean(model.draws["deformation_offset"]))
         place = place + free
         # The free shape is known, without force: no bend grows between it and the
         # nearer end of the tested range.
-        _, above = model.bends
+        _, above = main.bends
         low, high = above.far, above.end
         known = np.clip(place, min(low, free), max(high, free))
         place = np.clip(place, low, high) + (place - known)
@@ -237,10 +214,10 @@ def _bend(model: Model, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
     bend = mean + sd * score["bend"][:, None] * at.loading
     if at.quantity == "gear":
         bend = bend * at.factor
-    return bend, 1.0 - model.beyond(place)
+    return bend, 1.0 - main.beyond(place)
 
 
-def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
+def _drifts(model: JointModel, at: Conditions, score) -> dict[str, np.ndarray]:
     """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
 
     They act on a reading outside the tested temperatures.
@@ -250,29 +227,12 @@ def _drifts(model: Model, at: Conditions, score) -> dict[str, np.ndarray]:
     if at.quantity != "reading" or not kelvins.any():
         return dict.fromkeys(DRIFTS, np.zeros((model.size, at.size)))
     return {
-        name: (mean + sd * score[name][:, None] * at.loading) * kelvins
-        for name, (mean, sd) in rig_drifts(model).items()
+        name: (mean[:, None] + np.outer(sd * score[name], at.loading)) * kelvins
+        for name, (mean, sd) in model.drifts.items()
     }
 
 
-def rig_drifts(model: Model) -> dict[str, tuple[float, float]]:
-    """Return mean and sd of the drift of the gauge's zero [N/K] and the frame [mm/K].
-
-    By the priors of their effects, and none where the model has that effect.
-    """
-    case = model.posterior.case
-    # A frame expands by its own length, however short the stroke.
-    stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
-    priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
-    priors |= case.gear.effect_priors
-    held = {effect.name for effect in model.effects}
-    return {
-        name: (0.0, 0.0) if effect in held else moments(priors[f"{effect}.slope"])
-        for name, effect in DRIFTS.items()
-    }
-
-
-def _of_sizes(model: Model, at: Conditions, force, node_share) -> dict:
+def _of_sizes(model: JointModel, at: Conditions, force, node_share) -> dict:
     """Return the variance by the tolerance of each size [N²], (draw, row) each.
 
     The variance by all sizes together is divided as each alone would make it.

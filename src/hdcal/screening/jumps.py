@@ -1,6 +1,7 @@
 """Jumps of a zero: from one row on, the same curve with another origin."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -51,17 +52,10 @@ _BEYOND = 1.75
 
 @dataclass(frozen=True)
 class Jump:
-    """A change of a zero before a row.
-
-    Attributes:
-        row: the first one after it.
-        channel: `force`, `deformation` or `both`.
-        deformation: by which it jumped; 0 where it did not.
-        force: likewise.
-    """
+    """A change of a zero before a row: the step of each channel, 0 where none."""
 
     row: int
-    channel: str
+    channel: Literal["force", "deformation", "both"]
     deformation: float
     force: float
 
@@ -99,11 +93,8 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
 def _possible(x: np.ndarray, y: np.ndarray, scatter: float) -> list[tuple[int, bool]]:
     """Return rows before which a zero may have jumped, the clearest first.
 
-    A channel steps there as it does nowhere else near. Where the movement turns, or
-    rests without load, only one channel may do so, and the cycles have to tell more.
-
-    Returns:
-        Each row, and whether the movement turns there.
+    A channel steps there as it does nowhere else near. Where the movement turns, which
+    is returned with the row, only one channel may do so.
     """
     rows = looked_at(x, y)
     rows = rows[(rows >= SIDE) & (rows <= x.size - SIDE)]
@@ -150,10 +141,7 @@ def _one_way(values: np.ndarray, rows: np.ndarray, scatter: float) -> np.ndarray
 
 
 def _beyond_all(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
-    """Return a jump of one channel by more than its ranges before it and after it.
-
-    No movement explains it, wherever the part was: the other channel takes no part.
-    """
+    """Return a jump of one channel alone by more than its ranges before and after."""
     rows = np.arange(SIDE, x.size - SIDE)
     longer = []
     for values in (x, y):
@@ -199,9 +187,8 @@ def _jump(
     if not in_cycles and not _in_one_step(x, y, row, reach, scatter):
         return None
     jump = _measured(x, y, row, reach, scatter)
-    if abs(jump.deformation) < LEAST * spread(x) and abs(jump.force) < LEAST * spread(
-        y
-    ):
+    small = abs(jump.deformation) < LEAST * spread(x)
+    if small and abs(jump.force) < LEAST * spread(y):
         return None
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
@@ -250,10 +237,7 @@ def _measured(
 def _in_one_step(
     x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
 ) -> bool:
-    """Tell whether one step makes up the gap between both sides, within the noise.
-
-    At the knee of a preload several steps do.
-    """
+    """Tell whether one step makes up the gap of both sides; at a knee several do."""
     before, after = slice(max(row - reach, 0), row), slice(row, row + reach)
     runs = [np.diff(x[part]) for part in (before, after)]
     rises = [np.diff(y[part]) for part in (before, after)]
@@ -267,10 +251,7 @@ def _in_one_step(
 
 
 def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
-    """Tell whether the curve goes on with the same slope, over many rows.
-
-    A part that broke has another one, or none.
-    """
+    """Tell whether the curve goes on with the same slope; a broken part does not."""
     edges = np.r_[0, turns, x.size]
     left = edges[edges <= row - SIDE].max(initial=0)
     right = edges[edges >= row + SIDE].min(initial=x.size)
@@ -306,9 +287,8 @@ def _stays(
         return True
     way = sign * (-1.0) ** np.searchsorted(turns, np.arange(x.size), "left")
     # of the cycles next to it
-    first, last = np.searchsorted(turns, np.argmax(after)) + np.array(
-        [-_CYCLES, _CYCLES]
-    )
+    turn = int(np.searchsorted(turns, np.argmax(after)))
+    first, last = turn - _CYCLES, turn + _CYCLES
     ends = np.r_[0, turns, x.size]
     part = slice(ends[max(first + 1, 0)], ends[min(last + 1, ends.size - 1)])
     columns = np.column_stack([np.ones_like(x), x, way, after])[part]

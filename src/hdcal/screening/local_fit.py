@@ -40,12 +40,7 @@ class Usual:
 
     @classmethod
     def of(cls, values: np.ndarray, least: float) -> "Usual":
-        """Fit it to values, most of which are usual.
-
-        Args:
-            values: the statistic at many places; NaN where it does not exist.
-            least: smallest scale.
-        """
+        """Fit it to values, most of them usual; `least` is the smallest scale."""
         size = np.abs(values[np.isfinite(values)])
         if size.size < 2:
             return cls(np.inf, _FEW_DOF)
@@ -57,14 +52,10 @@ class Usual:
         return cls(scale, float(np.interp(-tail, -_TAILS, _DOFS)))
 
     def surprised(self, values: np.ndarray, places: int) -> np.ndarray:
-        """Tell which values a fault explains better, by a likelihood ratio.
+        """Tell which values a fault at one of many places explains better.
 
-        A fault has a place and a size of its own, each at the price that the
-        Bayesian information criterion sets.
-
-        Args:
-            values: the statistic; NaN where it does not exist.
-            places: at which a fault may be.
+        By a likelihood ratio: a fault has a place and a size, each at the price that
+        the Bayesian information criterion sets.
         """
         square = np.nan_to_num(values / self.scale) ** 2
         gain = 0.5 * (self.dof + 1.0) * np.log1p(square / self.dof)
@@ -88,10 +79,7 @@ def looked_at(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def spread(values: np.ndarray) -> float:
-    """Return the range that holds most of the values, blind to a few wild ones.
-
-    The central nine tenths, made as wide as an evenly filled range.
-    """
+    """Return the range of the central nine tenths, as of an evenly filled range."""
     some = values[:: max(1, values.size // _SOME)]
     low, high = (quantile(some, share) for share in (0.05, 0.95))
     if high > low:
@@ -100,10 +88,7 @@ def spread(values: np.ndarray) -> float:
 
 
 def resolution(values: np.ndarray) -> float:
-    """Return the smallest departure that counts in a channel.
-
-    A step of its last digit, and a share of its range that no rig resolves.
-    """
+    """Return the smallest departure that counts: a digit, or a share of the range."""
     values = values[:: max(1, values.size // _SOME)]
     least = RESOLVED * spread(values)
     fine = 1e-9 * float(np.ptp(values)) or 1.0
@@ -119,10 +104,7 @@ def windows(values: np.ndarray, rows: np.ndarray, offsets: np.ndarray) -> np.nda
 
 
 def slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the slopes of all pairs in each window, shape (r, pairs).
-
-    NaN where the deformation of a pair is the same.
-    """
+    """Return the slopes of all pairs in each window, NaN where x is the same."""
     first, second = np.array([*combinations(range(x.shape[1]), 2)]).T
     run, rise = x[:, second] - x[:, first], y[:, second] - y[:, first]
     return np.divide(rise, run, out=np.full(run.shape, np.nan), where=run != 0.0)
@@ -149,7 +131,7 @@ def median(values: np.ndarray, otherwise: float = np.nan) -> np.ndarray:
 def residuals(x: np.ndarray, y: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return how far rows lie from a robust line through their neighbours.
 
-    NaN at rows with fewer than three neighbours on either side.
+    NaN with fewer than three neighbours on either side.
     """
     offsets = np.r_[-REACH:0, 1 : REACH + 1]
     near_x = windows(x, rows, offsets) - x[rows, None]

@@ -54,9 +54,9 @@ class Observation:
     """One finding in the record.
 
     Attributes:
-        kind: what it is.
+        kind: kind of the finding.
         rows: first and last row of each stretch that it concerns, from 0.
-        size: how large it is, in `unit`.
+        size: its size, in `unit`.
         unit: unit of the size.
         action: what was done about it.
         run: index of the run.
@@ -86,10 +86,10 @@ class StraightPart:
     """The longest straight part of the largest movement of a run.
 
     Attributes:
-        low: smallest deformation of it, as read [mm].
-        high: largest deformation of it, as read [mm].
-        rows: which rows it has, shape (n,); other branches have none of them.
-        slope: slope of the force over the deformation there, by least squares [N/mm].
+        low: smallest deformation, as read [mm].
+        high: largest deformation, as read [mm].
+        rows: rows of the part, without those of other branches, shape (n,).
+        slope: slope of the force over the deformation, by least squares [N/mm].
         slope_sd: its standard error [N/mm].
         whole: whether every movement of the run is straight.
     """
@@ -104,22 +104,21 @@ class StraightPart:
 
 @dataclass(frozen=True)
 class Screening:
-    """A record after it was looked at.
+    """A record after screening; arrays have the shape (n,).
 
     Attributes:
-        observations: in the order of the record.
-        segment: index into `SEGMENTS` of each row, shape (n,).
-        kept: which rows stay in the record, shape (n,).
-        deformation: with each jump of its zero taken out [mm], shape (n,).
-        force: likewise, turned where its sign was opposite [N], shape (n,).
-        zero: counts the jumps of a zero before each row in its run, shape (n,).
+        observations: findings in the order of the record.
+        segment: index into `SEGMENTS` of each row.
+        kept: which rows stay in the record.
+        deformation: with each jump of its zero taken out [mm].
+        force: likewise, turned where its sign was opposite [N].
+        zero: number of jumps of a zero before each row in its run.
         deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
         trembling: whether that scatter hides the direction of the movement.
-        straight: the longest straight part of a single run; None of several ones, and
-            where too few rows are left.
+        straight: longest straight part of a single run; None of several runs, and where
+            too few rows are left.
         working_range: in words; empty where none is stated.
-        straight_in_range: the longest straight part within a range that was chosen by
-            its ends, likewise.
+        straight_in_range: longest straight part within a range chosen by its ends.
     """
 
     observations: tuple[Observation, ...]
@@ -152,11 +151,7 @@ class Screening:
 
     @property
     def excluded_sense(self) -> int:
-        """Sign of the movement whose rows were left out between rows that stayed.
-
-        It is that of the other branches where one alone was chosen; 0 where none was,
-        and where the scatter of the deformation mixes them.
-        """
+        """Sign of the movement of the branches that were left out; 0 where none was."""
         if self.deformation_sd:
             return 0
         x = self.deformation
@@ -171,11 +166,7 @@ class Screening:
 
 
 def stretches(rows: np.ndarray | Sequence[int]) -> Stretches:
-    """Return first and last row of each stretch of rows without a gap.
-
-    Args:
-        rows: increasing.
-    """
+    """Return first and last of each stretch of increasing rows without a gap."""
     rows = np.asarray(rows, int)
     if not rows.size:
         return ()

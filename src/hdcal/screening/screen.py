@@ -1,17 +1,33 @@
 """Screening of a record, run by run, before any model is fitted."""
 
+from itertools import pairwise
+from typing import Literal
+
 import numpy as np
 
 from hdcal.screening.branches import name_segments, straight_part
 from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
-from hdcal.screening.faults import look_at
 from hdcal.screening.result import DROPPED, Screening
-from hdcal.screening.run import Run
-from hdcal.screening.sign import Sign, plain_runs, sign_of_slope
+from hdcal.screening.run import Run, look_at
+from hdcal.screening.turning_points import turning_points
 from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 
+Sign = Literal["same", "opposite", "unclear", "unknown"]
+# A movement over this share of the range is a branch of the curve.
+_BRANCH = 0.2
+# Rank correlation from which on force and deformation surely go together, and the
+# standard errors beyond which it is no chance.
+_CLEAR = 0.9
+_CHANCE = 3.5
+# From more rows on the scatter of the deformation can be seen, and is looked for.
+_MOST_ROWS = 40
+# What the residuals of a line with independent noise rarely exceed: the largest one,
+# in sd, and the correlation of each with the next one, in its standard errors.
+_LARGEST, _CORRELATED = 2.8, 2.0
+# Share of the range of the force that is noise at most.
+_NOISE = 0.05
 # Rows from which the sign of a slope can be told.
 _FEWEST_FOR_SIGN = 5
 
@@ -24,7 +40,7 @@ def screen(
     whole: bool = True,
     wanted: WorkingRange | None = None,
 ) -> Screening:
-    """Look at a record: what of it is no curve of a part, and what was done about it.
+    """Find what of a record is no curve of a part, and deal with it.
 
     Args:
         deformation: as read [mm], in the order it was taken, shape (n,).
@@ -133,3 +149,54 @@ def _inside(wanted: WorkingRange | None, x: np.ndarray, y: np.ndarray) -> np.nda
 
 def _rough_slope(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])
+
+
+def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
+    """Tell whether force and deformation grow together.
+
+    Opposite: the force falls all along every branch, loading and unloading, as it does
+    when one channel is counted the other way. Unclear: it falls in the mean only.
+    """
+    together = _rank_correlation(x, y)
+    if together >= 0.0:
+        return "same"
+    turns, _ = turning_points(x, max(_BRANCH * float(np.ptp(x)), 10.0 * scatter))
+    ends = [0, *turns.tolist(), x.size - 1]
+    branches = [
+        _rank_correlation(x[first : last + 1], y[first : last + 1])
+        for first, last in pairwise(ends)
+        if last - first >= 4
+    ]
+    if branches and max(branches) < -_CLEAR:
+        return "opposite"
+    return "unclear" if together * np.sqrt(x.size - 1.0) < -_CHANCE else "same"
+
+
+def _rank_correlation(x: np.ndarray, y: np.ndarray) -> float:
+    step = max(1, x.size // 5000)
+    if min(np.ptp(x), np.ptp(y)) == 0.0:
+        return 0.0
+    ranks = np.array([np.argsort(np.argsort(each[::step])) for each in (x, y)])
+    return float(np.corrcoef(ranks[0], ranks[1])[0, 1])
+
+
+def plain_runs(x: np.ndarray, y: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Tell which runs, by index, are short, straight and rising with white noise."""
+    order = np.argsort(run, kind="stable")
+    x, y, run = x[order], y[order], run[order]
+    rows = np.bincount(run)
+    with np.errstate(all="ignore"):
+        x = x - (np.bincount(run, x) / rows)[run]
+        y = y - (np.bincount(run, y) / rows)[run]
+        slope = np.bincount(run, x * y) / np.bincount(run, x * x)
+        left = y - slope[run] * x
+        squares = np.bincount(run, left * left)
+        sd = np.sqrt(squares / rows)
+        largest = np.zeros(rows.size)
+        np.maximum.at(largest, run, np.abs(left))
+        same = np.diff(run) == 0
+        pairs = np.bincount(run[1:][same], (left[1:] * left[:-1])[same], rows.size)
+        correlation = np.abs(pairs / squares) * np.sqrt(rows)
+        noise = sd / np.sqrt(np.bincount(run, y * y) / rows)
+    plain = (rows < _MOST_ROWS) & (slope > 0.0) & (noise < _NOISE)
+    return plain & (largest <= _LARGEST * sd) & (correlation < _CORRELATED)

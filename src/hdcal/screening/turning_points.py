@@ -12,15 +12,7 @@ FEWEST_FOR_NOISE = 50
 
 
 def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
-    """Sd of the reading noise in a dense sequence, from second differences.
-
-    Args:
-        x: readings in the order they were taken, shape (n,).
-        fewest: rows that tell it.
-
-    Returns:
-        A robust sd, in the unit of the readings; 0 for fewer rows.
-    """
+    """Return a robust sd of the noise in a dense sequence; 0 for fewer rows."""
     if x.size < fewest:
         return 0.0
     # the sd of x[i-1] - 2 x[i] + x[i+1] is √6 times that of x
@@ -28,11 +20,9 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
 
 
 def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
-    """Rows at which the direction of movement reverses by more than a threshold.
+    """Return rows at which the movement reverses by more than a threshold.
 
-    Returns:
-        The rows of the reversals in order, and the sign of the first movement,
-        0 when x never moves by the threshold.
+    And the sign of the first movement, 0 where x never moves by the threshold.
     """
     # Only rows where the difference changes sign can be reversals, so the loop,
     # which has to be sequential, sees those alone.
@@ -63,23 +53,20 @@ def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
 
 
 def envelope(x: np.ndarray, sign: int) -> np.ndarray:
-    """Monotone envelope of one movement, rising whatever the sign, shape (n,)."""
+    """Return the monotone envelope of one movement, rising whatever the sign, (n,)."""
     return np.maximum.accumulate(x * sign)
 
 
 def resting(rising: np.ndarray, tolerance: float) -> np.ndarray:
-    """Rows of one movement at which the deformation is held.
+    """Tell at which rows of one movement the deformation is held, shape (n,).
 
-    A level is a hold when twice and four times the tolerance contain hardly more
-    rows than the tolerance itself: on a ramp they contain four times as many, at
-    the smooth top of a sine twice as many, at a hold with sharp ends no more.
+    A level is a hold where four times the tolerance contains hardly more rows than the
+    tolerance itself: on a ramp it contains four times as many, at the smooth top of a
+    sine twice as many.
 
     Args:
         rising: monotone envelope of the movement [mm], shape (n,).
         tolerance: spread of the readings inside a hold [mm].
-
-    Returns:
-        True on every row of a hold, its first one included, shape (n,).
     """
     near = _rows_within(rising, tolerance / 2)
     return (near >= 2) & (_rows_within(rising, 2 * tolerance) < 1.5 * near)

@@ -33,7 +33,7 @@ class WorkingRange:
     Attributes:
         low: lower end.
         high: upper end.
-        unit: mm of the deformation as read, or % of the largest force of a run; or
+        unit: mm of the deformation as read, % of the largest force of a run, or
             `straight` where the longest straight part sets the ends.
         one_branch: whether rows of other branches lie between the ends, and are cut.
     """
@@ -54,12 +54,7 @@ class WorkingRange:
         return f"{ends} of one branch" if self.one_branch else ends
 
     def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Tell which rows of a run lie in the range.
-
-        Args:
-            deformation: as read [mm], shape (n,).
-            force: as read [N], shape (n,).
-        """
+        """Tell which rows of a run lie in the range, from readings [mm, N], (n,)."""
         if self.unit == "mm":
             return (deformation >= self.low) & (deformation <= self.high)
         size = np.abs(force)
@@ -78,11 +73,11 @@ def read_range(text: str) -> WorkingRange:
         return WorkingRange(-math.inf, math.inf, unit)
     found = _ENDS.fullmatch(text)
     try:
-        assert found is not None
-        low, high = float(found[1]), float(found[3])
-        assert math.isfinite(low) and math.isfinite(high)
-    except (AssertionError, ValueError):
-        raise ValueError(f"'{text}' is no range") from None
+        low, high = (float(found[i]) for i in (1, 3)) if found else (math.inf, math.inf)
+    except ValueError:
+        low = high = math.inf
+    if found is None or not (math.isfinite(low) and math.isfinite(high)):
+        raise ValueError(f"'{text}' is no range")
     if bool(found[2]) != bool(found[4]):
         raise ValueError(f"'{text}' is in % at one end only")
     unit = "%" if found[2] else "mm"
@@ -96,14 +91,7 @@ def read_range(text: str) -> WorkingRange:
 def in_range(
     screening: Screening, wanted: WorkingRange, run: np.ndarray, units: Quantities
 ) -> Screening:
-    """Return a screening in which the rows outside the range are cut.
-
-    Args:
-        screening: result for the whole record.
-        wanted: the range.
-        run: index of each row's run, shape (n,).
-        units: units of the readings.
-    """
+    """Return a screening without the rows outside a range; run is their index, (n,)."""
     part = screening.straight
     if wanted.unit == STRAIGHT and part is not None:
         inside, x = part.rows, screening.deformation
@@ -122,13 +110,8 @@ def in_range(
         return replace(screening, working_range=wanted.words(units))
     segment = screening.segment.copy()
     segment[outside] = OUTSIDE
-    observed = Observation(
-        "outside the range",
-        stretches(outside),
-        wanted.high - wanted.low,
-        wanted.unit,
-        "cut",
-    )
+    width, rows = wanted.high - wanted.low, stretches(outside)
+    observed = Observation("outside the range", rows, width, wanted.unit, "cut")
     return replace(
         screening,
         observations=(*screening.observations, observed),

@@ -56,7 +56,6 @@ class Bank(eqx.Module):
         stiffness, variance: as read [N/mm]; of a reading without load at first [N²].
         step: of the force as read [N], 0 = not rounded.
         remounting: variance of the zero from one mounting to the next [N²].
-        reopen: share by which the stiffness may have moved at an alarm [-].
     """
 
     mean: Float[Array, "draw p"]
@@ -75,7 +74,6 @@ class Bank(eqx.Module):
     step: Float[Array, ""]
     remounting: Float[Array, ""]
     threshold: Float[Array, ""]
-    reopen: Float[Array, ""]
 
     @property
     def noise(self):
@@ -103,12 +101,11 @@ class Bank(eqx.Module):
         mean = weights @ middle
         return mean, jnp.sqrt(weights @ (scale**2 + (middle - mean) ** 2))
 
-    def widened(self, index: int, variance) -> "Bank":
-        """Return the bank after a coefficient may have moved by this variance."""
-        covariance = self.covariance.at[:, index, index].add(
-            variance * (self.shape - 1.0) / self.rate
-        )
-        return replace(self, covariance=covariance)
+    def remounted(self, is_new) -> "Bank":
+        """Return the bank before a row that may be the first of another mounting."""
+        moved = jnp.where(is_new, self.remounting, 0.0) * (self.shape - 1.0) / self.rate
+        covariance = self.covariance.at[:, ZERO, ZERO].add(moved)
+        return replace(self, covariance=covariance, epoch=self.epoch + is_new)
 
 
 @jax.jit
@@ -136,8 +133,7 @@ def follow_rows(bank: Bank, rows: dict[str, Any], count: int):
 
 def take_row(bank: Bank, row: dict[str, Any]):
     """Return the bank after a row, and FIELDS as the rows before predicted them."""
-    bank = bank.widened(ZERO, jnp.where(row["remounted"], bank.remounting, 0.0))
-    bank = replace(bank, epoch=bank.epoch + row["remounted"])
+    bank = bank.remounted(row["remounted"])
     forces, freedom = row["forces"], 2.0 * bank.shape
     # The row is scaled to the noise of a reading without load.
     noise = jnp.sqrt(1.0 + forces.excess / bank.variance)
@@ -173,10 +169,7 @@ def take_row(bank: Bank, row: dict[str, Any]):
     learns = row["follows"] & (repeated < _MOST_REPEATED)
     products = bank.products + jnp.where(learns, _products(bank, after), 0.0)
     sums, score, alarm = step_sums(bank.sums, innovation, bank.threshold)
-    opens = alarm & (bank.reopen > 0.0)
-    after = replace(after, products=products, sums=sums, epoch=bank.epoch + opens)
-    after = after.widened(STIFFNESS, jnp.where(opens, bank.reopen**2, 0.0))
-    after = after.widened(ZERO, jnp.where(opens, bank.remounting, 0.0))
+    after = replace(after, products=products, sums=sums)
     draws = jnp.exp(-logsumexp(2.0 * after.log_weight))
     line = *force, freedom, innovation, score, alarm, rho, *after.stiffness_now, draws
     return after, jnp.stack([jnp.asarray(each, float) for each in line])

@@ -5,45 +5,38 @@ import sys
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.console import Console, discard_output
+from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 
 
-@command(short_help="Follow readings as they come, with an alarm at a change.")
+@command(short_help="Track readings as they arrive, with an alarm at a change.")
 @click.argument("known", metavar="RUN")
 @click.option(
     "--alarm-rows",
     default=10_000.0,
     show_default=True,
     metavar="ROWS",
-    help="Mean number of readings from one false alarm to the next.",
-)
-@click.option(
-    "--reopen",
-    default=0.0,
-    show_default=True,
-    metavar="SHARE",
-    help="After an alarm let the stiffness move by this share; 0.1 learns anew.",
+    help="Set the mean number of readings between false alarms.",
 )
 @json_option
 @click.pass_obj
-def track(console: Console, known, **settings):
-    """Follow a gear reading by reading, from a calibration or diagnosis in RUN.
+def track(console: Console, known, alarm_rows):
+    """Track a gear reading by reading, from RUN of `hdcal calibrate` or `diagnose`.
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
-    "force_N": 37.8}, where known with temperature_C and run (a label of the mounting);
-    or the first line is a header row such as deformation_mm,force_N, and the others are
-    CSV. Each reading is answered at once by a line on standard output.
+    "force_N": 37.8}, optionally with temperature_C and run (a label of the mounting).
+    The input may also be CSV with a header such as deformation_mm,force_N. Each reading
+    is answered at once by a line on standard output.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
-    tracker, bad = Tracker(load_models(known), **settings), 0
-    (mean, half), rate = tracker.stiffness, settings["alarm_rows"]
+    tracker, bad = Tracker(load_models(known), alarm_rows=alarm_rows), 0
+    mean, half = tracker.stiffness
     words = (
         f"starts at {mean:.4g} ± {half:.2g} {tracker.units.stiffness_unit} (95 %) on a "
-        f"mounting that was not tested; one false alarm in {rate:g} readings"
+        f"mounting that was not tested; one false alarm in {alarm_rows:g} readings"
     )
     console.words("\n".join([words, *tracker.notes]))
     try:
@@ -52,13 +45,14 @@ def track(console: Console, known, **settings):
         console.words(f"interrupted after {tracker.rows} rows")
         return 130
     except BrokenPipeError:
+        console.unread = True
         discard_output()
-    due = tracker.readings / rate
+    due = tracker.readings / alarm_rows
     console.words(
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
         f"{due:.2g} false ones are due without a change"
     )
-    if tracker.alarms and not settings["reopen"]:
-        words = "without --reopen the answers remain those of the gear before a change"
-        console.words(f"{words}, which raises more alarms; --reopen 0.1 learns it")
+    if tracker.alarms:
+        words = "the answers remain those of the gear before a change, which raises "
+        console.words(f"{words}more alarms; after a change calibrate again")
     return 2 if bad else 0

@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from hdcal.data.case import Case
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import moments
@@ -18,9 +17,9 @@ from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.residuals import noise_warnings
 from hdcal.inference.force_model.values import Values, as_read
 from hdcal.prediction.forces import force_of, grid_records
-from hdcal.prediction.joint import join
-from hdcal.prediction.models import Model, Models, averaging_words, models_of
-from hdcal.prediction.simulate import draw_scores, rig_drifts
+from hdcal.prediction.joint import DRIFTS, JointModel, join
+from hdcal.prediction.models import Models, averaging_words, models_of
+from hdcal.prediction.simulate import draw_scores
 
 # At least this much probability must lie on models that a stream can follow.
 _LEAST_FOLLOWED = 0.5
@@ -54,20 +53,14 @@ class StreamDraws:
     """Draws of the models of a case that a stream can follow.
 
     Attributes:
-        case: that was calibrated.
-        problem: structure of the model with all effects.
-        models: that are followed.
-        model: number of the model of each draw, shape (draw,).
+        model: the models as one.
         values: parameters by site, [draw, …]; of a leftover discrepancy the mean.
         scores: coefficients of the leftover discrepancy, of unit variance, (draw, c).
         parts: weights that belong to each of these, shape (weight, c).
         bend: level of its law and normal score of each draw, (draw, 2).
     """
 
-    case: Case
-    problem: Problem
-    models: tuple[Model, ...]
-    model: np.ndarray
+    model: JointModel
     values: Values
     scores: np.ndarray
     parts: np.ndarray
@@ -76,20 +69,21 @@ class StreamDraws:
     @property
     def stiffness(self) -> np.ndarray:
         """Stiffness as read at the reference temperature [N/mm]."""
-        unit = float(self.problem.unit_stiffness) * self.problem.reading.radial_per_read
+        problem = self.model.problem
+        unit = float(problem.unit_stiffness) * problem.reading.radial_per_read
         return as_read(self.values, self.values["K"] * self.values["E0"] * unit)
 
     @property
     def variance(self) -> np.ndarray:
         """Variance of a reading without load, rounding included [N²]."""
-        rounding = float(self.problem.step) ** 2 / 12.0
+        rounding = float(self.model.problem.step) ** 2 / 12.0
         return self.values["sigma"] ** 2 + rounding
 
     def take(self, rows: np.ndarray) -> "StreamDraws":
-        """Return some of the draws."""
+        """Return some of the draws, by ascending places."""
         values = {name: column[rows] for name, column in self.values.items()}
-        scores, model, bend = self.scores[rows], self.model[rows], self.bend[rows]
-        return replace(self, values=values, scores=scores, model=model, bend=bend)
+        model, scores, bend = self.model.take(rows), self.scores[rows], self.bend[rows]
+        return replace(self, model=model, values=values, scores=scores, bend=bend)
 
     def at(self, deformation, temperature) -> RowForces:
         """Return the readings that the draws expect.
@@ -98,37 +92,25 @@ class StreamDraws:
             deformation: as read, shape (n,) [mm].
             temperature: of the specimen, shape (n,) [°C].
         """
-        records = self.case.records
+        model, level = self.model, self.bend[:, 0]
+        records = model.posterior.case.records
         low, high = np.min(records.deformation), np.max(records.deformation)
         warm = np.asarray(records.temperature)
         kelvins = temperature - np.clip(temperature, warm.min(), warm.max())
-        _, near = self._bends(np.clip(deformation, low, high))
-        mean, far = self._bends(deformation)
+        _, near = model.bend(np.clip(deformation, low, high), level)
+        mean, far = model.bend(deformation, level)
         # Inside the range each draw has a bend of its own, beyond it one unknown more.
-        drifts = np.stack([self._drift(name) for name in ("zero_drift", "frame_drift")])
+        drifts = np.stack([model.drifts[name] for name in DRIFTS])
         shift = mean + near * self.bend[:, 1:] * np.where(deformation < 0.0, -1.0, 1.0)
-        beyond = self.models[0].beyond(deformation)
+        beyond = model.models[0].beyond(deformation)
         rows = np.stack([deformation, temperature, kelvins, beyond])
-        found = _forces(self.problem, self.values, self.parts, drifts, rows)
+        found = _forces(model.problem, self.values, self.parts, drifts, rows)
         spread = np.sqrt(np.maximum(far**2 - near**2, 0.0)).T
         side = np.where(deformation > 0.5 * (low + high), 1.0, -1.0)
         outward = -1.0 if low + high < 0.0 else 1.0
         sign = side * outward * np.where(kelvins < 0.0, -1.0, 1.0)
         extrapolation = sign[:, None] * np.hypot(spread, found.extrapolation)
         return found._replace(mean=found.mean + shift.T, extrapolation=extrapolation)
-
-    def _bends(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and sd of the bend of each draw [N], (draw, n) each."""
-        mean, sd = np.empty((2, len(self.model), len(place)))
-        for number, model in enumerate(self.models):
-            mine = self.model == number
-            mean[mine], sd[mine] = model.bend(place, self.bend[mine, 0])
-        return mean, sd
-
-    def _drift(self, name: str) -> np.ndarray:
-        """Return mean and sd of a drift of the rig per kelvin, (draw, 2)."""
-        each = np.array([rig_drifts(model)[name] for model in self.models])
-        return each[self.model]
 
 
 def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
@@ -140,7 +122,7 @@ def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
     """
     found, hidden = models_of(models), {}
     for model in found:
-        for effect in model.effects:
+        for effect in model.posterior.effects:
             if effect.mixture or effect.needs - {"temperature"}:
                 hidden[model.name] = f"a stream does not show its '{effect.name}'"
     followed = [model for model in found if model.name not in hidden]
@@ -152,32 +134,30 @@ def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
     if left := noise_warnings(followed[0].posterior):
         notes += [*left, "This may cause alarms without a change."]
     whole = join(followed)
-    case, size, values = whole.posterior.case, whole.size, whole.draws
-    number = np.repeat(np.arange(len(followed)), [len(rows) for rows in whole.rows])
+    case, size, problem = whole.posterior.case, whole.size, whole.problem
     prior = followed[0].posterior.priors[MOUNTING]
     mounting = np.full(size, np.hypot(*moments(prior, MOUNTING)))
     # The error that a file states for its rows is noise of the stream.
     stated = np.mean(np.asarray(case.records.force_sd) ** 2)
-    sigma = np.sqrt(values["sigma"] ** 2 + stated)
-    values = {MOUNTING: mounting, **values, "sigma": sigma}
+    sigma = np.sqrt(whole.draws["sigma"] ** 2 + stated)
+    values = {MOUNTING: mounting, **whole.draws, "sigma": sigma}
     scores, parts = np.empty((size, 0)), np.empty((0, 0))
-    if whole.problem.discrepancy is not None:
-        mean, scores, parts = _leftover(whole.problem.discrepancy, values, case)
+    if problem.discrepancy is not None:
+        at = np.asarray(case.records.deformation)
+        mean, scores, parts = _leftover(problem.discrepancy, values, at)
         values |= {"gap_weights": mean}
     score = draw_scores(size, 0)
     bend = np.stack([score["law"], score["bend"]], axis=1)
-    known = case, whole.problem, tuple(followed), number, values, scores, parts, bend
-    return StreamDraws(*known), notes
+    return StreamDraws(whole, values, scores, parts, bend), notes
 
 
-def _leftover(discrepancy: Discrepancy, values: Values, case: Case):
+def _leftover(discrepancy: Discrepancy, values: Values, at: np.ndarray):
     """Return mean weights of the leftover discrepancy, its scores and their parts."""
     weights = values["gap_weights"]
     fitted = np.any(weights != 0.0, axis=1)
     mean = fitted[:, None] * weights[fitted].mean(axis=0)
     left, size, axes = np.linalg.svd(weights - mean, full_matrices=False)
     root = np.sqrt(np.count_nonzero(fitted))
-    at = np.asarray(case.records.deformation)
     parts = axes.T * (size / root)
     columns = np.asarray(discrepancy.columns(at, np.ones_like(at))) @ parts
     kept = np.abs(columns).max(axis=0) > _SMALL * np.median(values["sigma"])
@@ -189,7 +169,7 @@ def _forces(problem: Problem, values: Values, parts, drifts, rows):
     at, warm, kelvins, beyond = rows
     records = grid_records(at, warm, jnp.where(at < 0.0, -1.0, 1.0), 0.0)
     draw = partial(_force, problem, parts, records, kelvins, beyond)
-    return jax.vmap(draw, in_axes=(0, 1), out_axes=1)(values, drifts)
+    return jax.vmap(draw, in_axes=(0, 2), out_axes=1)(values, drifts)
 
 
 def _force(

@@ -18,26 +18,23 @@ _MOST_WITHIN = 0.1
 _PAIRS = 30.0
 
 
-def first_bank(
-    every: StreamDraws, threshold: float, reopen: float
-) -> tuple[StreamDraws, Bank]:
+def first_bank(every: StreamDraws, threshold: float) -> tuple[StreamDraws, Bank]:
     """Return some of the draws, and what they know of a stream.
 
     Args:
         every: all draws; of several gears, for a new one.
         threshold: of the change alarm [-].
-        reopen: share by which the stiffness may have moved at an alarm [-].
     """
-    usable = np.bincount(every.model)[every.model] >= _PER_COEFFICIENT
-    rows = np.flatnonzero(usable)
+    number, problem = every.model.number, every.model.problem
+    rows = np.flatnonzero(np.bincount(number)[number] >= _PER_COEFFICIENT)
     rows = rows[np.linspace(0, len(rows) - 1, DRAWS).astype(int)]
-    draws, problem = every.take(rows), every.problem
+    draws = every.take(rows)
     mean, covariance = _coefficients(every, rows)
     new = 1.0 + 1.0 / (problem.runs or 1), 1.0 + 1.0 / (problem.specimens or 1)
     covariance[:, 1, 1] += new[0] * draws.values[MOUNTING] ** 2
     covariance[:, 0, 0] += new[1] * draws.values.get("specimen_sd", 0.0) ** 2
-    logs, model = np.log(every.variance), every.model
-    logs -= (np.bincount(model, logs) / np.maximum(np.bincount(model), 1))[model]
+    logs = np.log(every.variance)
+    logs -= (np.bincount(number, logs) / np.maximum(np.bincount(number), 1))[number]
     spread = max(float(np.var(logs)), 1e-8)
     within = min(spread, _MOST_WITHIN)
     # ψ′(shape) = within, to its second order.
@@ -62,7 +59,6 @@ def first_bank(
         "step": step,
         "remounting": 2.0 * np.mean(every.values[MOUNTING] ** 2),
         "threshold": threshold,
-        "reopen": reopen,
     }
     arrays = {name: jnp.asarray(value, float) for name, value in state.items()}
     return draws, Bank(**arrays, epoch=jnp.zeros((), int))
@@ -83,8 +79,9 @@ def _coefficients(
     size = target.shape[1]
     mean = np.zeros((DRAWS, size + 2))
     covariance = np.tile(np.eye(size + 2), (DRAWS, 1, 1))
-    for model in np.unique(every.model[rows]):
-        of, here = every.model == model, every.model[rows] == model
+    number = every.model.number
+    for model in np.unique(number[rows]):
+        of, here = number == model, number[rows] == model
         about = shapes - shapes[of].mean(axis=0)
         left = target[of] - target[of].mean(axis=0)
         slope, _, rank, _ = np.linalg.lstsq(about[of], left, rcond=1e-10)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 from scipy.special import stdtrit
 
 from hdcal.data.plausible import implausible, range_of
-from hdcal.errors import Findings
+from hdcal.errors import InputError
 from hdcal.prediction.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.models import Models
 from hdcal.tracking.bank import CELL, FIELDS, follow_rows
@@ -59,8 +59,6 @@ class Tracker:
     Args:
         known: a calibration, or several with probabilities.
         alarm_rows: mean number of readings between false alarms, 10 to 10⁹.
-        reopen: after an alarm the stiffness may have moved by this share of itself
-            (one sd), and the zero as with a new mounting; 0 = an alarm changes nothing.
 
     Attributes:
         units: names and units of what is read.
@@ -76,17 +74,15 @@ class Tracker:
             of range.
     """
 
-    def __init__(
-        self, known: Models, *, alarm_rows: float = 10_000.0, reopen: float = 0.0
-    ):
-        with Findings() as wrong:
-            wrong += implausible("alarm_rows", alarm_rows)
-            wrong += implausible("reopen", reopen)
+    def __init__(self, known: Models, *, alarm_rows: float = 10_000.0):
+        if wrong := implausible("alarm_rows", alarm_rows):
+            raise InputError(wrong)
         every, self.notes = draws_of(known)
-        self._draws, self._bank = first_bank(every, threshold_for(alarm_rows), reopen)
-        self.units, rows = every.case.units, every.case.records
+        self._draws, self._bank = first_bank(every, threshold_for(alarm_rows))
+        case = every.model.posterior.case
+        self.units, rows = case.units, case.records
         self._keys = self.units.key("stiffness_N_per_mm"), self.units.key("force_N")
-        self._reference = every.case.gear.reference_temperature
+        self._reference = case.gear.reference_temperature
         tested = np.stack([rows.deformation, rows.temperature])
         self._low = np.min(tested, axis=1) - _SLACK
         self._high = np.max(tested, axis=1) + _SLACK
@@ -188,7 +184,7 @@ class Tracker:
             "correlation": found["correlation"],
             "tested": bool(found["tested"]),
         }
-        if any(effect.stage != "noise" for effect in self._draws.problem.effects):
+        if any(effect.stage != "noise" for effect in self._draws.model.effects):
             few = found["draws"] < _LEAST_DRAWS
             answer |= {"effective_particles": found["draws"], "degenerate": few}
             if few:

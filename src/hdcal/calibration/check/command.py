@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 _GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 
 
-@command(short_help="Read DATA and report what was read; compute nothing.")
+@command(short_help="Read and check DATA without computing.")
 @case_options
 @click.option(
-    "--effects", is_flag=True, help="Also list what the data lack for each effect."
+    "--effects", is_flag=True, help="List what the data lack for each effect."
 )
 @click.option(
     "--write-gear",
     metavar="GEAR.toml",
-    help="Without a gear file: write one there, with what is known from DATA.",
+    help="Write a gear file, if there is none, with what is known from DATA.",
 )
 @click.option(
     "--plot",
     metavar="FILE.png",
-    help="Draw the readings there (.png or .svg).",
+    help="Draw the readings to FILE (.png or .svg).",
 )
 @force_option
 @json_option
@@ -106,7 +106,7 @@ def _read(console: Console, given: dict[str, Any]) -> "Case | None":
     if is_case or not gear_files(given["data"]):
         return read_given(console, **given)
     console.wrong += without_meaning(["sheet"], "a folder of gears")
-    names = "data", "gear", "columns", "theory", "reading", "encoding", "range"
+    names = "data", "gear", "columns", "theory", "encoding", "range"
     how = {name: given[name] for name in names}
     found = console.wrong.attempt(read_gear_folder, **how)
     return None if found is None else found[0]

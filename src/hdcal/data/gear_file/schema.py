@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field
@@ -17,7 +16,7 @@ from hdcal.data.gear_file.rig_facts import RigTable
 from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.gear_file.validation import STRICT, fault, within
 from hdcal.data.plausible import range_of
-from hdcal.data.theory_names import READINGS, SPRING, Theory
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.screening.working_range import FORM, read_range
 
@@ -85,26 +84,21 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     Raises:
         InputError: a key is stated twice.
     """
-    plain = _with_text_keys(source)
-    tables: dict[str, Any] = {"gear": {}}
-    tables |= {key: plain[key] for key in plain if key in GearFile.model_fields}
-    for key in (key for key in plain if key not in GearFile.model_fields):
+    plain = {
+        str(key): dict(value) if isinstance(value, Mapping) else value
+        for key, value in source.items()
+    }
+    tables = {"gear": {}} | {n: plain[n] for n in GearFile.model_fields if n in plain}
+    for key in plain.keys() - GearFile.model_fields.keys():
         name = "measurement" if key in MeasurementTable.model_fields else "gear"
-        table = tables.get(name, {})
+        table = tables.setdefault(name, {})
         if not isinstance(table, dict):
             continue  # refused by the schema
         if key in table:
             words = f"is stated twice, alone and in the table [{name}]"
             raise InputError([Finding(key, words, "State it once")])
-        tables[name] = {**table, key: plain[key]}
+        table[key] = plain[key]
     return tables
-
-
-def _with_text_keys(source: Any) -> Any:
-    """Return a mapping and those in it as dictionaries with texts for keys."""
-    if not isinstance(source, Mapping):
-        return source
-    return {str(key): _with_text_keys(value) for key, value in source.items()}
 
 
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
@@ -121,11 +115,7 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
     if not isinstance(table, dict):
         return []
     missing = [name for name in SIZES_NEEDED if name not in table]
-    other = ""
-    if table.get("theory") == SPRING:
-        other = f"; or keep the theory '{SPRING}' of the file, which needs none"
-    elif missing == [*SIZES_NEEDED]:
-        other = f"; or take the theory '{SPRING}', which needs none"
+    other = f"; or take the theory '{SPRING}', which needs none"
     if (theory or table.get("theory")) == SPRING:
         missing = []
     findings = [
@@ -157,23 +147,3 @@ def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
         remedy = "Measure the load height from the closed base"
         faults.append(("load_height", words, remedy))
     return faults
-
-
-def with_reading(toml: TomlFile, reading: str | None) -> TomlFile:
-    """Return a gear file that states how the deformation is read, where it is silent.
-
-    Raises:
-        InputError: there is no such reading, or the file states another one.
-    """
-    measurement = toml.table.get("measurement", {})
-    if reading is None or not isinstance(measurement, dict):
-        return toml
-    stated = measurement.get("deformation", reading)
-    if reading not in READINGS:
-        remedy = f"It is {' or '.join(READINGS)}"
-        raise InputError([Finding("reading", f"there is no '{reading}'", remedy)])
-    if stated != reading:
-        words = f"'{reading}' was asked for, and the gear file says '{stated}'"
-        raise InputError([Finding("reading", words, "Correct the one that is wrong")])
-    measurement = {**measurement, "deformation": reading}
-    return replace(toml, table={**toml.table, "measurement": measurement})

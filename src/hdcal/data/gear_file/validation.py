@@ -1,6 +1,5 @@
 """Checks of tables by pydantic, and the translation of its errors into findings."""
 
-import re
 from collections.abc import Iterator
 from typing import Any, TypeVar, get_args
 
@@ -20,13 +19,10 @@ _EXAMPLES = {
     "priors": "[priors]",
     "name": 'name = "XB1-100-80"',
     "material": 'material = "steel"',
-    "theory": 'theory = "ring"',
-    "deformation": 'deformation = "radial"',
     "force_calibration": "force_calibration = { expanded_percent = 0.5, k = 2 }",
     "deformation_calibration": "deformation_calibration = { expanded_mm = 0.002 }",
     "temperature_calibration": "temperature_calibration = { expanded_K = 1.0 }",
     "range": 'range = "10%:40%"',
-    "family": 'family = "normal"',
 }
 
 
@@ -50,7 +46,7 @@ def within(quantity: str) -> AfterValidator:
 def checked(
     kind: type[M], data: Any, toml: TomlFile, key: str = "", context: Any = None
 ) -> M:
-    """Return data as a model of pydantic.
+    """Return the table at a dotted key of a file as a model of pydantic.
 
     Raises:
         InputError: holds everything that is wrong with the data.
@@ -89,21 +85,23 @@ def _faults(
 
 def _words(error: dict, place: list[str], model: Any) -> tuple[str, str]:
     """Return problem and remedy of an error of pydantic at a key of a model."""
-    kind, name = error["type"], place[-1] if place else ""
+    name = place[-1] if place else ""
     example = _EXAMPLES.get(name, f"{name} = … (a number)")
-    if kind == _FAULT:
-        return error["ctx"]["problem"], error["ctx"]["remedy"]
-    if kind == "extra_forbidden":
-        for key in place[:-1]:
-            annotation = model.model_fields[key].annotation
-            # A table that may be missing is "this one, or nothing".
-            model = next(iter(get_args(annotation)), annotation)
-        return "unknown key", did_you_mean(name, [*model.model_fields])
-    if kind == "missing":
-        return "is missing", f"Add it: {example}"
-    if kind == "literal_error":
-        known = re.findall(r"'([^']+)'", error["ctx"]["expected"])
-        return f"unknown choice '{error['input']}'", did_you_mean(
-            str(error["input"]), known
-        )
+    match error["type"]:
+        case "fault":
+            return error["ctx"]["problem"], error["ctx"]["remedy"]
+        case "extra_forbidden":
+            for key in place[:-1]:
+                annotation = model.model_fields[key].annotation
+                # A table that may be missing is "this one, or nothing".
+                model = next(iter(get_args(annotation)), annotation)
+            return "unknown key", did_you_mean(name, [*model.model_fields])
+        case "missing":
+            return "is missing", f"Add it: {example}"
+        case "literal_error":
+            known = error["ctx"]["expected"].replace(" or ", ", ").split(", ")
+            remedy = did_you_mean(
+                str(error["input"]), [one.strip("'") for one in known]
+            )
+            return f"unknown choice '{error['input']}'", remedy
     return error["msg"][:1].lower() + error["msg"][1:], f"Write it like {example}"

@@ -16,11 +16,9 @@ def bad_gears(
 ) -> dict[str, Finding]:
     """Return the gears with a faulty row, each with its first fault."""
     bad: dict[str, Finding] = {}
-    places = np.flatnonzero(np.isin(rows, [*findings.rows])) if findings.rows else ()
-    for place in places:
-        label = str(gears[place])
-        if label and label not in bad:
-            bad[label] = findings.rows[int(rows[place])]
+    for place in np.flatnonzero(np.isin(rows, [*findings.rows])):
+        if label := str(gears[place]):
+            bad.setdefault(label, findings.rows[int(rows[place])])
     return bad
 
 
@@ -31,9 +29,8 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     """Return that bad gears can be left out; `many` counts all, where it is known."""
-    words = f"{len(bad)} of the gears read so far"
-    words = words if many is None else f"{len(bad)} of {many} gears"
-    words += f" {_be(bad)} bad: {shortened([*map(quoted, bad)], _LISTED)}"
+    words = f"{len(bad)} of {many or 'the'} gears {_be(bad)} bad: "
+    words += shortened([*map(quoted, bad)], _LISTED)
     remedy = "Set it to leave these gears out as a whole and evaluate the others"
     return Finding("skip_bad", words, remedy)
 
@@ -47,9 +44,8 @@ def left_out_words(left_out: Mapping[str, Finding], many: int) -> str:
 
 def cause(finding: Finding) -> str:
     """Return the fault of a gear, with its place where that is a row."""
-    if finding.row is None:
-        return finding.problem
-    return f"{finding.where}: {finding.problem}"
+    place = "" if finding.row is None else f"{finding.where}: "
+    return f"{place}{finding.problem}"
 
 
 def _be(gears: Mapping[str, Finding]) -> str:

@@ -48,8 +48,6 @@ def case_of(
     Raises:
         InputError: as `screened`.
     """
-    if measured.units == TORQUE:
-        _require_torsion(gear, name)
     wanted = asked_range(range or gear.source.get("measurement", {}).get("range"))
     before = gear_notes(gear, measured["force"])
     notes = [*notes, *before, *temperature_note(measured.get("temperature"))]
@@ -121,11 +119,9 @@ def _require_torsion(gear: Gear, name: str) -> None:
         words = f"torques over angles are no readings of the theory {gear.theory}"
         remedy = "Leave the gear file out, or state the theory spring in it"
         raise InputError([Finding(name, words, remedy)])
-    tables = (gear.source.get(name, {}) for name in ("gear", "measurement"))
-    stated = [key for table in tables for key in table]
+    stated = [*gear.source.get("gear", {}), *gear.source.get("measurement", {})]
     wrong = [key for key in stated if key.endswith(("_N", "_mm")) or key in _OF_FORCE]
-    wrong += [key for key in ("priors", "rig") if key in gear.source]
-    if wrong:
+    if wrong := [*wrong, *({"priors", "rig"} & gear.source.keys())]:
         words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
         words += "and the readings are torques over angles"
         raise InputError([Finding(name, words, "Leave these entries out")])

@@ -8,7 +8,6 @@ import pandas as pd
 from hdcal.data.case import Gear
 from hdcal.data.findings import FileFindings
 from hdcal.data.plausible import RANGES
-from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import DIMENSIONS
 
@@ -20,13 +19,12 @@ _ROUNDED = 1e-9
 def check_whole(
     frame: pd.DataFrame,
     used: Mapping[str, Column],
-    table: ReadTable,
     findings: FileFindings,
     fewest: int = FEWEST_ROWS,
 ) -> None:
     """Find too few rows in a source, and a deformation that is constant."""
-    if table.filled < fewest:
-        words = f"holds {table.filled} rows of readings"
+    if len(frame) < fewest:
+        words = f"holds {len(frame)} rows of readings"
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
         column = used["deformation"]
@@ -49,31 +47,24 @@ def check_rows(
         known = RANGES[column.quantity]
         slack = _ROUNDED if quantity == "temperature" else 0.0
         wild = (values < known.low - slack) | (values > known.high)
-        words = known.problem(), "Check the number and its unit"
-        rows = frame.index[wild].tolist()
-        findings.add_rows(((row, *words) for row in rows), column.header)
+        _add(
+            frame,
+            wild,
+            (known.problem(), "Check the number and its unit"),
+            column,
+            findings,
+        )
 
 
 def check_reach(
     frame: pd.DataFrame, column: Column, gear: Gear, findings: FileFindings
 ) -> None:
-    """Find the farthest row of each specimen that no gear of this radius reaches.
-
-    Rows with another fault do not count.
-    """
-    size = np.abs(frame["deformation"].to_numpy())
-    beyond = (size >= gear.reach) & ~np.isin(frame.index, [*findings.rows])
-    places = np.flatnonzero(beyond)
-    rising = places[np.argsort(size[places], kind="stable")]
-    gears = frame["specimen"].to_numpy()
-    farthest = {gears[place]: int(place) for place in rising}
-    radius = f"a radius of {gear.geometry.radius:g} mm"
+    """Find deformations that no gear of this radius reaches."""
+    beyond = np.abs(frame["deformation"].to_numpy()) >= gear.reach
+    words = f"no gear with a radius of {gear.geometry.radius:g} mm is deformed so far"
     remedy = "Check the unit of the column and the radius in the gear file"
-    faults = (
-        (int(frame.index[i]), f"a deformation of {size[i]:g} mm on {radius}", remedy)
-        for i in sorted(farthest.values())
-    )
-    findings.add_rows(faults, column.header)
+    beyond &= ~np.isin(frame.index, [*findings.rows])
+    _add(frame, beyond, (words, remedy), column, findings)
 
 
 def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
@@ -86,3 +77,14 @@ def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
     faulty = np.zeros(len(time), bool)
     faulty[order[1:][back]] = True
     return faulty
+
+
+def _add(
+    frame: pd.DataFrame,
+    wrong: np.ndarray,
+    words: tuple[str, str],
+    column: Column,
+    findings: FileFindings,
+) -> None:
+    rows = frame.index[wrong].tolist()
+    findings.add_rows(((row, *words) for row in rows), column.header)

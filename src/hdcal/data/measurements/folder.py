@@ -37,7 +37,6 @@ def read_gear_folder(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    reading: str | None = None,
     encoding: str | None = None,
     skip_bad: bool | None = None,
     range: str | None = None,
@@ -53,7 +52,6 @@ def read_gear_folder(
             first gear. Others may differ from it in their sizes.
         columns: as in `read_case`, and so are all that follow.
         theory: overrides the gear file's.
-        reading: `radial` or `diametral`.
         encoding: encoding of the files.
         skip_bad: whether bad gears are left out.
         range: working range.
@@ -64,7 +62,7 @@ def read_gear_folder(
     Returns:
         The case, and a table of the sizes of each gear where they have files.
     """
-    asked, (named, _) = (theory, reading), asked_columns(data, columns)
+    named, _ = asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
     labels, cases = gear_labels(files, folder)
     own = [file.parent / GEAR_NAME for file in files] if cases else []
@@ -74,14 +72,14 @@ def read_gear_folder(
         gear = next(path for path in own if path.exists())
     base = str(nearby) if gear is None else "`gear`"
     base = str(gear) if isinstance(gear, str | Path) else base
+    parts: list[_Part] = []
+    unread: dict[str, Findings] = {}
     with Findings() as wrong:
-        common, notes = wrong.attempt(gear_of, gear, nearby, False, asked) or (None, ())
-        parts: list[_Part] = []
-        unread: dict[str, Findings] = {}
+        described = wrong.attempt(gear_of, gear, nearby, False, theory)
+        common, notes = described or (None, ())
         for place, (file, label) in enumerate(zip(files, labels, strict=True)):
-            each, its = Findings(), None
-            if own:
-                its = each.attempt(read_gear, own[place], *asked)
+            each = Findings()
+            its = each.attempt(read_gear, own[place], theory) if own else None
             if its is not None and common is not None:
                 each += _differences(its, common, own[place], base)
             here = its or common
@@ -141,26 +139,22 @@ def _why(first: Finding, folder: Path) -> Finding:
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
     """Yield differences of a gear file from that of all gears, but for sizes."""
-    mine, theirs = (
-        pd.json_normalize(each.source).to_dict("records")[0] for each in (one, other)
-    )
-    remedy = "Gears of one kind differ in their sizes only"
-    keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
-    keys = [key for key in keys if mine.get(key) != theirs.get(key)]
-    for key in keys:
-        here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
-        words = f"is {here}, and {there} in {base}"
-        yield Finding(str(file), words, remedy, None, key)
+    mine, theirs = map(_of_kind, (one, other))
+    for key in sorted({*mine, *theirs}):
+        if mine.get(key) != theirs.get(key):
+            here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
+            words = f"is {here}, and {there} in {base}"
+            remedy = "Gears of one kind differ in their sizes only"
+            yield Finding(str(file), words, remedy, None, key)
+
+
+def _of_kind(gear: Gear) -> dict[str, Any]:
+    """Return what all gears of a kind share, by dotted keys of the gear file."""
+    stated = pd.json_normalize(gear.source).to_dict("records")[0]
     # Materials of one name may stand in several files.
-    if not keys and _material(one) != _material(other):
-        words = f"its material is another one than in {base}"
-        yield Finding(str(file), words, remedy, None, "gear.material")
-
-
-def _material(gear: Gear) -> list[tuple]:
-    """Return what a material decides: the priors of modulus and temperature loss."""
-    priors = [gear.priors[name] for name in ("E0", "alpha")]
-    return [(prior.family, prior.numbers) for prior in priors]
+    priors = [f"{n} {gear.priors[n].numbers}" for n in ("E0", "alpha")]
+    stated["gear.material"] = f"{gear.material} with {' and '.join(priors)}"
+    return {str(k): v for k, v in stated.items() if not str(k).startswith(_OWN)}
 
 
 def _sizes(parts: Sequence[_Part]) -> dict[str, list]:

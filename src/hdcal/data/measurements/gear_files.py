@@ -11,7 +11,7 @@ from hdcal.errors import Finding, InputError, quoted, shortened
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 # Tables of readings by their names. A text may be a remark: it counts as one only where
 # nothing else does.
-_TABLES = (".csv", ".tsv", ".dat", ".asc", ".lvm", ".xlsx", ".mat", ".parquet")
+_TABLES = (".csv", ".tsv", ".dat", ".asc", ".lvm", ".xlsx", ".parquet")
 _TEXT = ".txt"
 _LISTED = 3
 
@@ -42,9 +42,8 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
         remedy = f"Keep one of both; {files[-1].name} is such a file"
         raise InputError([Finding(str(folder), words, remedy)])
     labels = [(file.parent.name if cases else file.stem).strip() for file in files]
-    twice = [label for label, many in Counter(labels).items() if many > 1]
     words, remedy = "is the name of several files", "Rename all but one"
-    if twice:
+    if twice := [label for label, many in Counter(labels).items() if many > 1]:
         raise InputError(
             Finding(str(folder), f"{quoted(one)} {words}", remedy) for one in twice
         )
@@ -65,8 +64,7 @@ def file_of_gear(data: Path, label: str | None) -> Path:
         file = files[labels.index(label)]
         return file.parent if cases else file
     words = "holds a file for each gear, not one case"
-    if label is not None:
-        words += f"; none is called {quoted(label)}"
+    words += "" if label is None else f"; none is called {quoted(label)}"
     remedy = "Read all of them as a fleet, or name one as `specimen`"
     raise InputError([Finding(str(data), words, remedy)])
 

@@ -1,45 +1,16 @@
-"""Measurements of several sources below each other: sheets, files of a folder."""
+"""Measurements of several sources below each other: files of a folder, batches."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from hdcal.data.case import Gear
-from hdcal.data.findings import FileFindings
-from hdcal.data.measurements.measurements import Measurements, read_measurements
+from hdcal.data.measurements.measurements import Measurements
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.tables.workbook import sheets_like
-from hdcal.errors import Finding, Findings
-
-
-def read_sheets(
-    path: Path,
-    mapping: Mapping[str, str] | None,
-    pattern: str,
-    gear: Gear | None,
-    skip_bad: bool | None,
-) -> Measurements:
-    """Read the sheets of a workbook whose names fit a pattern, each a specimen.
-
-    Raises:
-        InputError: holds everything that is wrong with them.
-    """
-    with FileFindings(str(path)) as findings:
-        names, note = sheets_like(path, findings, pattern)
-    parts = []
-    with Findings() as wrong:
-        for name in names:
-            how: dict = {"sheet": name, "gear": gear, "skip_bad": skip_bad}
-            one = wrong.attempt(read_measurements, path, mapping, **how)
-            if one is not None:
-                parts.append(labelled(one, name))
-    whole = joined(parts, 20.0 if gear is None else gear.reference_temperature, {})
-    return replace(whole, notes=(note, *whole.notes))
+from hdcal.errors import Finding
 
 
 def labelled(measured: Measurements, label: str) -> Measurements:

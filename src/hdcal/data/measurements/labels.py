@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.data.measurements.dates import dates_of, days_of
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
 # What is the same all through a mounting.
 TELLING = ("date", "rig", "operator")
+# The day of a time stamp in any form; a date in ISO 8601, alone or with a time.
+_DAY = r"^(\d+[-./]\d+[-./]\d+)"
+_ISO = r"^\d{4}-\d\d-\d\d(?:[T ]|$)"
 
 
 def mountings(frame: pd.DataFrame) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -50,24 +52,18 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
     stated = {name: np.asarray(values[name]) for name in TELLING if name in values}
     if not stated:
         return None
-    if "date" in stated:
-        stated["date"] = days_of(stated["date"])
     cells = pd.DataFrame(stated, dtype=object)
     cells = cells.mask(cells == NOT_STATED)
+    if "date" in cells:
+        cells["date"] = cells["date"].str.extract(_DAY)[0]
     cells = cells.groupby(gear).ffill().groupby(gear).bfill().fillna(NOT_STATED)
     several = cells.groupby(gear).nunique().gt(1).any()
     # Not what is the same for all mountings of each gear.
     telling = cells.columns[several]
     if telling.empty:
         return None
-    table = cells[telling].assign(gear=gear)
-    index = table.groupby([*table], sort=False).ngroup().to_numpy()
-    each = table.drop_duplicates()
-    labels = each[telling].agg(" ".join, axis=1)
-    # No two mountings of a gear have the same label.
-    count = labels.groupby([each["gear"], labels]).cumcount()
-    names = [f"{n} ({k + 1})" if k else n for n, k in zip(labels, count, strict=True)]
-    return np.array(names, object)[index]
+    first, *others = (cells[name] for name in telling)
+    return first.str.cat(others, sep=" ").to_numpy(object)
 
 
 def further_labels(
@@ -82,12 +78,11 @@ def further_labels(
     Returns:
         The labels, and notes on those that are not used.
     """
-    days = frame["date"].to_numpy() if "date" in frame else ()
     each = {
         "lots": _one_each(frame, "lot", gear, gears),
         "operators": _one_each(frame, "operator", run, runs),
         "rigs": _one_each(frame, "rig", run, runs),
-        "dates": dates_of(days, run),
+        "dates": _dates(frame, run),
     }
     labels = {name: one for name, (one, _) in each.items()}
     return labels, [note for _, note in each.values() if note]
@@ -112,3 +107,26 @@ def _one_each(
         return (), f"{quantity}s are not used: {word} {name} has several"
     stated = dict(zip(each["of"], each["label"], strict=True))
     return tuple(stated.get(one, NOT_STATED) for one in range(len(names))), ""
+
+
+def _dates(frame: pd.DataFrame, run: np.ndarray) -> tuple[tuple[str, ...], str]:
+    """Return the first date of each run in ISO 8601, and a note.
+
+    A run that states none has an empty one. There are none where one cannot be read.
+    """
+    texts: Any = pd.Series(frame["date"].to_numpy() if "date" in frame else []).astype(
+        str
+    )
+    stated = texts[texts != NOT_STATED]
+    if stated.empty:
+        return (), ""
+    # The local time counts, whatever its zone.
+    local = stated.str.replace(r"(Z|[+-]\d\d:?\d\d)$", "", regex=True)
+    local = local.where(stated.str.contains(r"[T ]"), stated)
+    times = pd.to_datetime(local, format="ISO8601", errors="coerce")
+    wrong = times.isna() | ~stated.str.contains(_ISO)
+    if wrong.any():
+        words = f"dates are not used: {quoted(stated[wrong].iloc[0])} cannot be read"
+        return (), f"{words}. Write dates as in 2026-09-01, year first"
+    first = times.reindex(texts.index).groupby(run).min()
+    return tuple("" if pd.isna(one) else one.isoformat() for one in first), ""

@@ -29,7 +29,7 @@ from hdcal.data.tables.columns import (
     in_place_of_force,
 )
 from hdcal.data.tables.headers import QUANTITIES
-from hdcal.data.tables.sources import read_source, source_name
+from hdcal.data.tables.sources import IN_MEMORY, is_frame, read_source
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
 from hdcal.quantities import FORCE, TORQUE, Quantities
@@ -123,7 +123,7 @@ def read_measurements(
     Raises:
         InputError: holds everything that is wrong with the source.
     """
-    name = source_name(data)
+    name = IN_MEMORY if is_frame(data) else str(data)
     name = name if sheet is None else f"{name}, sheet {quoted(sheet)}"
     with FileFindings(name) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
@@ -192,7 +192,7 @@ def _measured(
         notes.append("the readings below each row of headers are a run")
     frame = pd.DataFrame(values, index=table.rows)
     if whole:
-        check_whole(frame, used, table, findings)
+        check_whole(frame, used, findings)
     check_rows(frame, used, findings)
     stated = frozenset(values)
     one = np.zeros(len(frame), np.int8)

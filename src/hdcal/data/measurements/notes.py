@@ -10,7 +10,6 @@ from hdcal.data.measurements.labels import TELLING
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.columns import Column
-from hdcal.data.tables.headers import LABELS, parse_header
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted, shortened
 from hdcal.quantities import Quantities
@@ -26,51 +25,30 @@ def source_notes(
     table: ReadTable, used: Mapping[str, Column], others: Sequence[str] = ()
 ) -> list[str]:
     """Return what was assumed of a source, other notes, and what of it is not used."""
-    notes = [*_assumed(table, used), *table.left_out, *others]
-    return [*notes, *_unused_columns(table, used)]
-
-
-def _assumed(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
-    """Yield what was assumed of a source, each with how to say otherwise."""
-    for note in table.notes:
-        yield f"{ASSUMED}{note}"
-    for column in used.values():
-        if column.against and column.unit is not None:
-            yield (
-                f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as was "
-                f"stated, though it names {column.against}"
-            )
-    guesses = [column for column in used.values() if column.guessed]
-    meanings = [
-        f"{quoted(column.header)} is the {column.quantity}"
-        + ("" if column.unit is None else f" in {column.unit.name}")
-        for column in guesses
+    notes = [f"{ASSUMED}{note}" for note in table.notes]
+    notes += [
+        f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as was stated, "
+        f"though it names {column.against}"
+        for column in used.values()
+        if column.against and column.unit is not None
     ]
+    guesses = [column for column in used.values() if column.guessed]
     if guesses:
+        meanings = ", ".join(map(_meaning, guesses))
         form = "HEADER" if guesses[0].unit is None else "HEADER[UNIT]"
         option = f"--column '{guesses[0].quantity}={form}'"
-        yield f"{ASSUMED}{', '.join(meanings)}. If not, name the column: {option}"
-
-
-def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
-    """Yield what of a file was not read."""
+        notes.append(f"{ASSUMED}{meanings}. If not, name the column: {option}")
+    notes += [*table.left_out, *others]
     positions = {column.position for column in used.values()}
-    quantities = {column.quantity for column in used.values()}
-    headers = enumerate(table.headers)
-    extra = [header for place, header in headers if place not in positions and header]
-    for header in extra:
-        meant = parse_header(header)
-        label = meant.quantity in LABELS
-        named = meant.quantity and meant.quantity not in quantities
-        if named and (label or not meant.unit):
-            why = "differs from row to row" if label else "names no unit"
-            option = f"'{meant.quantity}={header}{'' if label else '[UNIT]'}'"
-            yield (
-                f"{ASSUMED}{quoted(header)}, which may be the {meant.quantity}, is not "
-                f"used, as it {why}. Name the column to use it: --column {option}"
-            )
+    extra = [h for place, h in enumerate(table.headers) if place not in positions and h]
     if extra:
-        yield f"columns not used: {', '.join(map(quoted, extra))}"
+        notes.append(f"columns not used: {', '.join(map(quoted, extra))}")
+    return notes
+
+
+def _meaning(column: Column) -> str:
+    unit = "" if column.unit is None else f" in {column.unit.name}"
+    return f"{quoted(column.header)} is the {column.quantity}{unit}"
 
 
 def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
@@ -111,14 +89,13 @@ def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator
 def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[str]:
     """Yield by what mountings are told apart, where no column `run` does that."""
     telling = [name for name in TELLING if name in stated]
-    if "run" in stated or runs <= gears or not telling:
-        return
-    differ = " or ".join(", ".join(telling).rsplit(", ", 1))
-    yield (
-        f"{ASSUMED}without a column `run`, rows of a gear that differ in {differ} are "
-        f"of different mountings: {runs} mountings of {gears} "
-        f"gear{'s' if gears > 1 else ''}. If not, name the mountings in a column `run`"
-    )
+    if "run" not in stated and runs > gears and telling:
+        yield (
+            f"{ASSUMED}without a column `run`, rows of a gear that differ in "
+            f"{' or '.join(telling)} are of different mountings: {runs} mountings of "
+            f"{gears} gear{'s' if gears > 1 else ''}. If not, name the mountings in a "
+            "column `run`"
+        )
 
 
 def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
@@ -127,7 +104,6 @@ def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
     if gears == 1 and many > 1:
         yield (
             f"{many} rigs read this gear, and a calibration or a diagnosis takes "
-            "them for one: where their gains differ it sees a change of the gear. "
-            "Leave the rows of one rig at a time; `hdcal fleet` tells rigs apart by "
-            "the gears that several of them read"
+            "them for one: where their gains differ, the gear seems to change. Leave "
+            "the rows of one rig at a time, or use `hdcal fleet`"
         )

@@ -16,7 +16,6 @@ from hdcal.data.measurements.measurements import Measurements, measured_in
 from hdcal.data.measurements.notes import source_notes
 from hdcal.data.measurements.screened import asked_range
 from hdcal.data.reading import gear_of
-from hdcal.data.tables.arrays import frame_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.columns import (
     REQUIRED,
@@ -25,6 +24,7 @@ from hdcal.data.tables.columns import (
     choose_columns,
     in_place_of_force,
 )
+from hdcal.data.tables.grid import frame_grid
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.tables.parquet_files import (
     frame_of,
@@ -50,7 +50,7 @@ class Parquet:
 
     Attributes:
         name: name of the file or folder.
-        gear: common to all gears.
+        gear: the gear file's, common to all gears.
         files: in their order.
         root: their folder; empty where there is one file.
         schema: columns of all files.
@@ -87,7 +87,6 @@ def open_parquet(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    reading: str | None = None,
     range: str | None = None,
 ) -> Parquet:
     """Look into a Parquet file, or a folder of them, partitioned or not.
@@ -102,7 +101,7 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        common, notes = gear_of(gear, nearby, False, (theory, reading))
+        common, notes = gear_of(gear, nearby, False, theory)
         named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
         table = table_of(frame_grid(frame_of(first)), findings)
@@ -147,7 +146,7 @@ def read_batches(
                 days = frame[name].dt.tz_localize(None).dt.normalize()
                 frame[name] = days.astype("category")
             grid = frame_grid(frame, first)
-            table = ReadTable(tuple(headers), first, grid, rows.num_rows)
+            table = ReadTable(tuple(headers), first, grid)
             how: dict = {"skip_bad": skip_bad, "whole": False}
             read = measured_in(table, used, findings, source.gear, **how)
         yield read

@@ -48,7 +48,7 @@ def screened(
     *,
     whole: bool = True,
 ) -> tuple[Measurements, Screening]:
-    """Look at a record, and return what of it is a curve of the part.
+    """Return the rows of a record that are a curve of the part, and its screening.
 
     Args:
         measured: as read.

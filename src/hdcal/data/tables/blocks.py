@@ -5,19 +5,30 @@ between and below them: names and units, titles, remarks, summaries, and spoilt
 readings, which are kept so that their bad cells become findings.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from hdcal.data.findings import FileFindings, row_list
-from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import ArrayGrid, Grid, SourceLine
+from hdcal.data.tables.cells import are_numbers, is_number
+from hdcal.data.tables.grid import Grid, SourceLine
 from hdcal.data.tables.headings import Heading, find_heading
-from hdcal.data.tables.other_lines import OtherLines, is_summary
+from hdcal.errors import quoted
 
 # Rows at the top, and spread over the rest, that show which columns hold numbers.
 _SAMPLE = 400
+# Rows from which a table of other columns is too large to be passed over.
+_FEWEST = 5
+_SUMMARIES = {
+    *("mean", "average", "avg", "sum", "total", "sd", "std", "stdev", "std dev"),
+    *("median", "cv", "range", "variance", "minimum", "maximum", "min", "max"),
+    *("standard deviation", "mittelwert", "summe", "standardabweichung", "stdabw"),
+    *("moyenne", "somme", "écart type", "平均", "平均值", "最大值", "最小值"),
+}
+_COMMENT = re.compile(r"[#%]")
 
 
 @dataclass(frozen=True)
@@ -28,7 +39,6 @@ class ReadTable:
         headers: with their units, shape (c,).
         header_row: row of the headers in the source, or of the first reading.
         grid: the readings.
-        filled: number of lines with any cell in them, whether they fit or not.
         named: whether there is a row of headers.
         conflicts: unit that a row of units states against a header, by position.
         unit_row: that row.
@@ -42,9 +52,8 @@ class ReadTable:
     headers: tuple[str, ...]
     header_row: int
     grid: Grid
-    filled: int
     named: bool = True
-    conflicts: Mapping[int, str] = field(default_factory=dict)
+    conflicts: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
     unit_row: int | None = None
     empty: frozenset[int] = frozenset()
     notes: tuple[str, ...] = ()
@@ -58,16 +67,102 @@ class ReadTable:
 
     def take(self, kept: np.ndarray) -> "ReadTable":
         """Return the rows that are true in a mask, shape (n,)."""
-        return replace(
-            self,
-            grid=self.grid.take(kept),
-            filled=self.filled - int(np.sum(~kept)),
-            runs=None if self.runs is None else self.runs[kept],
-        )
+        runs = None if self.runs is None else self.runs[kept]
+        return replace(self, grid=self.grid.take(kept), runs=runs)
 
 
-def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str, ...]]:
-    """Return the readings of a grid under their headers, and the titles above these."""
+class _OtherLines:
+    """Sorting of the lines that are no readings.
+
+    Args:
+        width: cells of a reading.
+        counted: positions of the columns that hold numbers.
+
+    Attributes:
+        above: number of titles above the first reading.
+        spoilt: rows of readings with a bad cell.
+        faults: row, problem and remedy of each line that is wrong.
+    """
+
+    def __init__(self, width: int, counted: list[int]):
+        self._width, self._counted, self.above = width, counted, 0
+        self.spoilt: list[int] = []
+        self.faults: list[tuple[int, str, str]] = []
+        self._left: list[SourceLine] = []
+
+    def sort(
+        self, lines: list[SourceLine], *, titled: bool = False, below: bool = False
+    ) -> None:
+        """Sort the lines between two readings.
+
+        Args:
+            lines: in their order.
+            titled: whether a heading follows them.
+            below: whether no reading follows.
+        """
+        words, others = 0, []
+        for line in lines:
+            if self._is_spoilt(line, titled=titled):
+                self.spoilt.append(line.row)
+            elif line.counts and not line.fits and len(line.cells) == words > 1:
+                others.append(line)
+            elif _is_remark(line, titled=titled, below=below):
+                self._left.append(line)
+            else:
+                self._refuse(line)
+            words = words if line.counts else len(line.cells)
+        if len(others) >= _FEWEST:
+            problem = "a second table with other columns begins here"
+            remedy = "Split the file: one table each"
+            self.faults.append((others[0].row, problem, remedy))
+        else:
+            self._left += others
+
+    def _is_spoilt(self, line: SourceLine, *, titled: bool) -> bool:
+        """Tell whether a line is a reading with a bad cell."""
+        if not line.fits or _is_summary(line.first) or _COMMENT.match(line.first):
+            return False
+        cells = [line.cells[place] for place in self._counted]
+        if titled:
+            # Titles may hold numbers too; they begin with words.
+            return is_number(cells[0])
+        return any(map(is_number, cells)) or all(cells)
+
+    def _refuse(self, line: SourceLine) -> None:
+        """Add the fault of a line that has another number of cells."""
+        problem = f"has {len(line.cells)} cells where the header row has {self._width}"
+        remedy = f"Write {self._width} cells, or remove the line"
+        if '"' in line.first:
+            remedy += "; close each quotation mark"
+        elif len(line.cells) > self._width:
+            remedy += "; with decimal commas separate the columns by semicolons"
+        self.faults.append((line.row, problem, remedy))
+
+    @property
+    def note(self) -> tuple[str, ...]:
+        """A note on lines that are not read, if there are some."""
+        if not self._left:
+            return ()
+        rows = row_list(sorted(line.row for line in self._left))
+        return (f"no readings: {rows}, as {quoted(self._left[0].first)}",)
+
+
+def _is_remark(line: SourceLine, *, titled: bool, below: bool) -> bool:
+    """Tell whether a line is words, which may stand at this place."""
+    if _COMMENT.match(line.first) or _is_summary(line.first):
+        return True
+    if line.counts or (len(line.cells) == 1 and line.first.count('"') % 2):
+        return False
+    return titled or (below and line.numbers < 2) or line.fits
+
+
+def _is_summary(cell: str) -> bool:
+    """Tell whether a cell begins a line that sums up the readings above it."""
+    return cell.strip(" .:").lower() in _SUMMARIES
+
+
+def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
+    """Return the readings of a grid under their headers."""
     sample = _sample(grid)
     counted, empty = _kinds(sample)
     known = _are_readings(sample, counted)
@@ -81,16 +176,11 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
     for line in sorted(lines):
         above = int(np.searchsorted(body.rows[clean], line.row))
         groups.setdefault(above, []).append(line)
-    heading = find_heading(groups[0], grid.width)
-    cells = grid.width if heading is None else heading.cells
-    if heading is not None and not empty.issuperset(range(cells, grid.width)):
-        words = f"names {cells} columns, and the readings below have {grid.width}"
-        findings.refuse(words, "Name every column", heading.row)
-    others = OtherLines(grid.width, counted, findings)
-    headings = [others.sort_above(groups.pop(0), heading)]
+    others = _OtherLines(grid.width, counted)
+    headings = [_first_heading(groups.pop(0), grid.width, empty, others, findings)]
     total = int(clean.sum())
     for above, lines in groups.items():
-        later = find_heading(lines, grid.width, heading) if heading else None
+        later = find_heading(lines, grid.width, headings[0])
         if later is None or above == total:
             others.sort(lines, below=above == total)
         else:
@@ -101,10 +191,38 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str
         body, clean = grid, grid.rows >= first
         clean[clean] = _are_readings(grid.take(clean), counted)
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
-    table = _joined(readings, headings, empty, others, findings)
-    findings.add_rows(others.faults)
-    filled = len(readings.rows) + len(others.faults)
-    return replace(table, filled=filled), headings[0].titles
+    words = "the columns differ from those of the first block"
+    remedy = "Name them alike, in the same order, or split the file"
+    foreign = [one.row for one in headings if one.names != headings[0].names]
+    findings.add_rows([*((row, words, remedy) for row in foreign), *others.faults])
+    return _table(readings, headings, empty, others)
+
+
+def _first_heading(
+    lines: list[SourceLine],
+    width: int,
+    empty: frozenset[int],
+    others: _OtherLines,
+    findings: FileFindings,
+) -> Heading:
+    """Return the heading above the first reading; without one columns are numbered.
+
+    Raises:
+        InputError: it names fewer columns than the readings have.
+    """
+    heading = find_heading(lines, width)
+    if heading is None:
+        words = [i for i, line in enumerate(lines) if not line.counts]
+        others.above = max(words, default=-1) + 1
+        others.sort(lines[others.above :])
+        return Heading(tuple(str(i + 1) for i in range(width)))
+    if not empty.issuperset(range(heading.cells, width)):
+        words = f"names {heading.cells} columns, and the readings below have {width}"
+        findings.refuse(words, "Name every column", heading.row)
+    above = {line.row for line in lines if line.row <= heading.last}
+    others.above = len(above - {heading.row, heading.unit_row})
+    others.sort([line for line in lines if line.row > heading.last])
+    return heading
 
 
 def _sample(grid: Grid) -> Grid:
@@ -140,12 +258,12 @@ def _are_readings(grid: Grid, counted: list[int]) -> np.ndarray:
     unsure = [place for place in counted if not grid.is_numeric(place)]
     numbers = np.full(len(grid.rows), len(counted))
     fits = np.full(len(grid.rows), len(counted) > 0)
-    for cells in grid.read(unsure).values():
+    for place in unsure:
+        cells = grid.read(place)
         if cells.dtype == object:
-            each = cells.tolist()
-            held = [not isinstance(c, str) or is_number(c) for c in each]
-            numbers -= ~np.array(held, bool)
-            fits &= np.array(held, bool) | np.array([c == "" for c in each], bool)
+            held = are_numbers(cells)
+            numbers -= ~held
+            fits &= held | (cells == "")
     fits &= numbers >= min(2, len(counted))
     if 0 not in counted and unsure:
         fits &= ~_summaries(grid.texts(0))
@@ -157,7 +275,7 @@ def _summaries(words: list[str]) -> np.ndarray:
 
     One that stands in several rows below each other is a label.
     """
-    known = {word for word in {*words} if is_summary(word)}
+    known = {word for word in {*words} if _is_summary(word)}
     found = np.zeros(len(words), bool)
     for place in (i for i, word in enumerate(words) if known and word in known):
         neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
@@ -165,61 +283,30 @@ def _summaries(words: list[str]) -> np.ndarray:
     return found
 
 
-def _joined(
-    grid: Grid,
-    headings: list[Heading],
-    empty: frozenset[int],
-    others: OtherLines,
-    findings: FileFindings,
+def _table(
+    grid: Grid, headings: list[Heading], empty: frozenset[int], others: _OtherLines
 ) -> ReadTable:
-    """Return the readings of all blocks under the headings of the first one."""
-    main = headings[0]
+    """Return the readings of all blocks under the heading of the first one."""
+    main, notes = headings[0], []
+    if others.above:
+        names = ", ".join(f"'{name}'" for name in main.names)
+        lines = "1 line" if others.above == 1 else f"{others.above} lines"
+        notes.append(f"{lines} above the table taken for titles. Its columns: {names}")
+    if main.unit_row is not None and main.unit_row > main.row:
+        notes.append(f"row {main.unit_row} taken for the units of the columns")
+    if len(headings) > 1:
+        notes.append(f"the headers stand {len(headings)} times. If not, split the file")
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
-    orders = [_order(heading, main) for heading in headings]
-    foreign = [h.row for h, order in zip(headings, orders, strict=True) if not order]
-    words = "the columns differ from those of the first block"
-    remedy = "Name them alike, or split the file"
-    findings.add_rows((row, words, remedy) for row in foreign)
-    usual = [*range(grid.width)]
-    moved = {i: order for i, order in enumerate(orders) if order and order != usual}
-    left_out = [*others.left_out()]
-    if moved:
-        grid = _reordered(grid, block, moved)
-        rows = row_list([headings[place].row for place in moved])
-        words = "the columns stand in another order below the headers of"
-        left_out.append(f"{words} {rows}")
     runs = np.unique(block, return_inverse=True)[1]
     return ReadTable(
         headers=main.names,
         header_row=main.row or (int(grid.rows[0]) if len(grid.rows) else 1),
         grid=grid,
-        filled=0,
         named=main.row > 0,
         conflicts=main.conflicts,
         unit_row=main.unit_row,
         empty=empty,
-        notes=(*others.assumed(main, len(headings)),),
-        left_out=tuple(left_out),
+        notes=tuple(notes),
+        left_out=others.note,
         runs=runs if runs.any() else None,
     )
-
-
-def _order(heading: Heading, main: Heading) -> list[int] | None:
-    """Return the places of the first block's columns in another block, or None."""
-    if heading.names == main.names:
-        return [*range(len(main.names))]
-    alike = sorted(heading.names) == sorted(main.names)
-    if not alike or len({*main.names}) < len(main.names):
-        return None
-    return [heading.names.index(name) for name in main.names]
-
-
-def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> Grid:
-    """Return a grid with the columns of some blocks in the order of the first."""
-    columns = grid.read(range(grid.width))
-    spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
-    moved = [columns[place].astype(object) for place in range(grid.width)]
-    for number, (begin, end) in spans.items():
-        for place, other in enumerate(orders[number]):
-            moved[place][begin:end] = columns[other][begin:end]
-    return ArrayGrid(grid.rows, grid.width, [], moved)

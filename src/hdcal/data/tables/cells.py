@@ -10,6 +10,8 @@ from hdcal.data.units import UNITS
 
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
 _POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# Float() takes more than numbers: nan, inf, 1_000.
+_PLAIN = re.compile(r"[-+.eE\d\n]+", re.ASCII)
 _UNITS = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
 _WITH_UNIT = re.compile(rf"([+-]?[\d.,eE+-]+)\s*({_UNITS})")
 # Whole numbers whose thousands are marked by points; by commas, at least once.
@@ -34,6 +36,14 @@ def unit_in(cell: str) -> str:
     """Return the unit behind the number in a cell, as in '12.5 N'; else ''."""
     parts = _WITH_UNIT.fullmatch(cell)
     return parts[2] if parts is not None and NUMBER.fullmatch(parts[1]) else ""
+
+
+def are_numbers(cells: np.ndarray) -> np.ndarray:
+    """Tell which cells hold numbers, shape (n,)."""
+    if _plain_floats(cells, ".,") is not None:
+        return np.ones(len(cells), bool)
+    held = [not isinstance(c, str) or is_number(c) for c in cells.tolist()]
+    return np.array(held, bool)
 
 
 def read_number(cell: str, comma: bool) -> float:
@@ -68,21 +78,28 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
     stored as such, commas that may all mark thousands do not count.
     """
     cells = [cell for column in columns for cell in column.tolist()]
-    texts = [cell for cell in cells if isinstance(cell, str) and NUMBER.match(cell)]
-    commas = [cell for cell in texts if "," in cell]
-    points = sum("." in cell and "," not in cell for cell in texts)
+    texts = [cell for cell in cells if isinstance(cell, str)]
+    commas = [cell for cell in texts if "," in cell and NUMBER.match(cell)]
+    if not commas:
+        return False
+    points = sum("." in c and "," not in c and bool(NUMBER.match(c)) for c in texts)
     stored = any(not isinstance(cell, str) and cell % 1 for cell in cells)
     if stored and all(map(_THOUSANDS.fullmatch, commas)):
         return False
-    return bool(commas) and len(commas) >= points
+    return len(commas) >= points
 
 
 def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault]]:
-    """Read a column that is no plain array of numbers.
+    """Return the cells of a column as floats, NaN where one is wrong, and the faults.
 
-    Returns:
-        Floats, NaN where a cell is wrong, shape (n,); and the faults.
+    Args:
+        cells: floats, or texts and stored numbers, shape (n,).
+        comma: whether the decimal mark of texts is a comma.
     """
+    if cells.dtype != object:
+        return cells, []
+    if (floats := _plain_floats(cells, "," if comma else ".")) is not None:
+        return floats, []
     numbers, faults = np.full(len(cells), np.nan), []
     for index, cell in enumerate(cells.tolist()):
         try:
@@ -93,6 +110,25 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
         except CellError as error:
             faults.append((index, *error.args))
     return numbers, faults
+
+
+def _plain_floats(cells: np.ndarray, marks: str) -> np.ndarray | None:
+    """Return texts as floats if all are finite numbers with one of the marks."""
+    texts = cells.tolist()
+    if not texts or not all(isinstance(text, str) for text in texts):
+        return None
+    joined = "\n".join(texts)
+    used = {mark for mark in ".," if mark in joined}
+    if len(used) > 1 or not used <= {*marks}:
+        return None
+    joined = joined.replace(",", ".")
+    if not _PLAIN.fullmatch(joined) or joined.count("\n") != len(texts) - 1:
+        return None
+    try:
+        floats = np.array(joined.split("\n"), float)
+    except ValueError:
+        return None
+    return floats if np.isfinite(floats).all() else None
 
 
 def may_hold_thousands(numbers: np.ndarray) -> bool:
@@ -112,9 +148,11 @@ def thousands(cells: list[str]) -> list[Fault]:
     if len(pointed) == len(cells) or not all(map(_POINTED.fullmatch, cells)):
         return []
     words = "may be a thousand, as no other number here has decimals"
-    faults = []
-    for index in pointed:
-        cell = cells[index]
-        remedy = f"Write {cell.replace('.', '')} if it is one, else {cell}0"
-        faults.append((index, f"'{cell}' {words}", remedy))
-    return faults
+    return [
+        (
+            index,
+            f"'{cells[index]}' {words}",
+            f"Write {cells[index].replace('.', '')} if it is one, else {cells[index]}0",
+        )
+        for index in pointed
+    ]

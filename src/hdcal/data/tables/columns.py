@@ -1,7 +1,6 @@
 """Choice of columns: which one is read as which quantity, in which unit.
 
-A column is read where its header, or the user, names it. Where several may be meant, or
-a unit is missing, that is asked; nothing is guessed.
+Where several may be meant, or a unit is missing, that is asked; nothing is guessed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -41,7 +40,7 @@ class Column:
         header: as written in the file.
         position: 0 = first column.
         unit: unit of its numbers; None for labels.
-        guessed: its header is not spelt `quantity_unit`.
+        guessed: whether its header is not spelt `quantity_unit`.
         against: another unit, which its header names itself.
     """
 
@@ -68,9 +67,9 @@ def choose_columns(
     Args:
         table: whose headers are read.
         mapping: quantity -> header with the unit in square brackets.
-        quantities: to look for.
-        required: which of them must be there.
-        findings: gets one for each header that is wrong or missing.
+        quantities: quantities to look for.
+        required: those that must be there.
+        findings: receives one for each header that is wrong or missing.
 
     Raises:
         InputError: there are no headers, and the user names no column by its number.
@@ -111,10 +110,7 @@ def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
 
 
 def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
-    """Return how a user would name each column: its header or number, with its unit.
-
-    Columns with hdcal's own headers need no other name.
-    """
+    """Return the name of each column for `columns`, but for hdcal's own headers."""
     named = {}
     for column in used.values():
         quantity, header = column.quantity, parse_header(column.header)
@@ -122,9 +118,9 @@ def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
             continue
         alone = table.headers.count(column.header) == 1
         name = column.header if alone else str(column.position + 1)
-        enough = alone and header.unit == column.unit
-        unit = "" if column.unit is None else column.unit.name
-        named[quantity] = name if enough or not unit else f"{name}[{unit}]"
+        if column.unit is not None and not (alone and header.unit == column.unit):
+            name = f"{name}[{column.unit.name}]"
+        named[quantity] = name
     return named
 
 
@@ -154,19 +150,18 @@ class _Chooser:
 
     def named(self, quantity: str, wanted: str) -> Column | None:
         """Return the column that a user named: 'Load [kN]', 'Load[kN]' or '2[kN]'."""
-        headers, add = self._table.headers, self._findings.add
+        headers = self._table.headers
         name, unit_text = _split_brackets(wanted)
         places, option = _places(wanted, name, headers), f"`columns` {quantity}="
         if len(places) != 1:
+            near = get_close_matches(name, headers, 1, 0.4) or headers[:_SHOWN]
             words = f"{option}{wanted} names a column that is not there"
-            near = get_close_matches(name, headers, 1, 0.4)
-            remedy = f"Use a header of the file, such as '{near[0]}'" if near else ""
-            remedy = remedy or "Use one of: " + ", ".join(headers[:_SHOWN])
+            remedy = f"Use a header of the file: {', '.join(near)}"
             if places:
                 words = f"{option}{wanted} fits {len(places)} columns"
                 numbers = " or ".join(str(place + 1) for place in places)
                 remedy = f"Name it by its number, {numbers}"
-            add(words, remedy, self._table.header_row, name)
+            self._findings.add(words, remedy, self._table.header_row, name)
             return None
         header, parsed = headers[places[0]], self._headers[places[0]]
         if quantity in LABELS:
@@ -175,33 +170,25 @@ class _Chooser:
         unit = in_header if unit_text is None else find_unit(unit_text)
         if unit is None or unit.dimension != DIMENSIONS[quantity]:
             text = parsed.unit_text if unit_text is None else unit_text
-            words = f"has no unit that is known for {quantity}"
-            words = f"unknown unit '{text}' for {quantity}" if text else words
+            words = f"unknown unit '{text}' for {quantity}"
             remedy = f"Write {option}'{name}[UNIT]'; {unit_advice(text, quantity)}"
-            add(words, remedy, self._table.header_row, header)
+            self._add(words, remedy, places[0])
             return None
         against = ""
-        if in_header not in (None, unit) and in_header.dimension == unit.dimension:
+        if in_header and in_header != unit and in_header.dimension == unit.dimension:
             against = in_header.name
         return Column(quantity, header, places[0], unit, against=against)
 
     def measured(self, quantity: str, *, needed: bool) -> Column | None:
-        """Return the only column of a quantity; more than one is asked about."""
-        exact = self._where(lambda h: h.exact and h.quantity == quantity)
-        good = [p for p in exact if self._headers[p].measures(quantity)]
-        if len(good) == 1:
-            return self._column(quantity, good[0])
-        if len(good) > 1:
-            names = " and ".join(quoted(self._table.headers[place]) for place in good)
-            words = f"two columns hold the {quantity}: {names}"
-            self._add(words, "Keep one of them", good[1])
-            return None
-        if exact:
-            self._ask_unit(quantity, exact[0])
-            return None
+        """Return the only column of a quantity; of several it is asked which is meant.
+
+        One that is spelt `quantity_unit` is meant rather than others.
+        """
         named = self._where(lambda h: h.quantity == quantity)
+        exact = [place for place in named if self._headers[place].exact]
+        named = exact or named
         fitting = [p for p in named if self._headers[p].measures(quantity)]
-        if not needed:
+        if not (needed or exact):
             # One that names nothing else is meant rather than one that says more.
             chosen = [p for p in fitting if self._headers[p].whole] or fitting
             return self._column(quantity, chosen[0]) if len(chosen) == 1 else None
@@ -209,7 +196,7 @@ class _Chooser:
         nameless = self._where(
             lambda h: not h.quantity and not h.excluded and h.measures(quantity)
         )
-        several = sorted([*fitting, *nameless])
+        several = fitting if exact else sorted([*fitting, *nameless])
         if len(several) == 1 and fitting:
             return self._column(quantity, fitting[0])
         if several:
@@ -236,11 +223,7 @@ class _Chooser:
         return self._column(quantity, places[0]) if len(places) == 1 else None
 
     def _label_places(self, quantity: str) -> list[int]:
-        """Return the places of the labels of a quantity, by headers and cells.
-
-        Of columns that tell the same rows apart the first one, and of those that tell
-        none apart one only where no other does.
-        """
+        """Return the places of the labels of a quantity, by headers and cells."""
         headers = self._headers
         named = [i for i, header in enumerate(headers) if header.quantity == quantity]
         if exact := [i for i in named if headers[i].exact]:
@@ -252,6 +235,7 @@ class _Chooser:
             counted = quantity == "run" and bool((np.diff(index) != 0).all())
             if quantity not in GROUPINGS and (counted or len(texts) >= len(index)):
                 continue
+            # Of several that part the rows in the same way the first one is meant.
             kinds.setdefault(index.tobytes() if len(texts) > 1 else b"", place)
         return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
 
@@ -272,15 +256,12 @@ class _Chooser:
 
     def _ask_which(self, quantity: str, places: Sequence[int]) -> None:
         names = [quoted(self._table.headers[place]) for place in places]
-        option = f"`columns` '{quantity}={places[0] + 1}'"
+        numbers = ", ".join(str(place + 1) for place in places)
+        words = f"the {quantity} may be {' or '.join(names)}"
         if len(places) == 1:
             words = f"no header names the {quantity}, which {names[0]} may hold"
-            remedy = f"If so, say {option}"
-        else:
-            words = f"the {quantity} may be {', '.join(names[:-1])} or {names[-1]}"
-            numbers = ", ".join(str(place + 1) for place in places)
-            remedy = f"Say which, by its number: {option}"
-            remedy += f"; the numbers are {numbers}" if len(places) > 2 else ""
+        remedy = f"Say which, by its number ({numbers}): "
+        remedy += f"`columns` '{quantity}={places[0] + 1}'"
         self._add(words, remedy, places[min(1, len(places) - 1)])
 
     def _ask_unit(self, quantity: str, place: int) -> None:
@@ -301,6 +282,10 @@ class _Chooser:
         remedy = f"Say {option}HEADER[UNIT]', HEADER one of: {shown}"
         for place, header in enumerate(self._headers):
             unit = header.unit_text if header.measures(quantity) else ""
+            if unit and place in self._table.empty:
+                words += f"; {quoted(headers[place])} has no cells"
+                remedy = "Fill it in; of a workbook with formulas, save their values"
+                break
             if quantity == "force" and (weight := weight_unit(header.unit_text)):
                 words += f"; {headers[place]} is a mass"
                 unit = weight
@@ -349,5 +334,5 @@ def _refuse_conflicts(
         unit = table.conflicts.get(column.position)
         if unit and column.unit is not None and not column.against:
             words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
-            remedy = "Leave one of them out"
-            findings.add(f"{words}units {unit}", remedy, table.unit_row)
+            words += f"units {unit}"
+            findings.add(words, "Leave one of them out", table.unit_row)

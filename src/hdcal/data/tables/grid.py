@@ -1,17 +1,15 @@
 """Grids of cells: every source becomes one before its readings are searched."""
 
 import csv
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+import hashlib
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import compress
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import is_number
 
 SEPARATORS = "\t;|,"
@@ -47,175 +45,61 @@ class SourceLine(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Grid(ABC):
+class Grid:
     """Rows of cells.
 
     Attributes:
         rows: row of the source of each, shape (n,), 1 = first.
-        width: cells of a row.
+        columns: shape (n,) each: floats, NaN for an empty cell, where the source states
+            that a column holds numbers; else texts on one line and stored numbers.
         loose: rows of the source with another number of cells.
+        separator: character between the cells of a text.
     """
 
     rows: np.ndarray
-    width: int
-    loose: list[SourceLine]
+    columns: list[np.ndarray]
+    loose: tuple[SourceLine, ...] = ()
+    separator: str = ""
 
-    @abstractmethod
-    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
-        """Return columns by position, shape (n,) each.
+    @property
+    def width(self) -> int:
+        """Number of cells of a row."""
+        return len(self.columns)
 
-        Floats where every cell is a finite number, else objects: texts without blanks
-        around them, or numbers where the source stores numbers.
-        """
+    def read(self, place: int) -> np.ndarray:
+        """Return a column: finite floats, else texts and stored numbers, shape (n,)."""
+        cells = self.columns[place]
+        if cells.dtype == object:
+            stored = all(isinstance(cell, float | int) for cell in cells.tolist())
+            return cells.astype(float) if stored and len(cells) else cells
+        if np.isfinite(cells).all():
+            return cells
+        return np.where(np.isnan(cells), "", cells.astype(object))
 
-    @abstractmethod
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
+    def texts(self, place: int) -> list[str]:
+        """Return the cells of a column as texts."""
+        index, texts = self.labels(place)
+        return np.array(texts, object)[index].tolist()
 
-    @abstractmethod
-    def take(self, chosen: np.ndarray) -> Self:
-        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
-
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+    def labels(self, place: int) -> tuple[np.ndarray, list[str]]:
         """Return the index of each cell, shape (n,), and the texts in a column."""
-        index, texts = pd.factorize(np.array(self.texts(column), object))
-        return index, texts.tolist()
+        index, cells = pd.factorize(self.read(place))
+        return index, [*map(stored_text, cells.tolist())]
 
-    def is_numeric(self, column: int) -> bool:
+    def is_numeric(self, place: int) -> bool:
         """Tell whether the source itself states that a column holds only numbers."""
-        return False
+        return self.columns[place].dtype != object
 
-    def has_commas(self) -> bool:
-        """Tell whether texts may have decimal commas that `read` takes for such."""
-        return False
+    def take(self, chosen: np.ndarray) -> "Grid":
+        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
+        columns = [column[chosen] for column in self.columns]
+        return replace(self, rows=self.rows[chosen], columns=columns, loose=())
 
     def lines(self) -> list[SourceLine]:
         """Return the rows."""
-        if not len(self.rows):
-            return []
         cells = zip(*map(self.texts, range(self.width)), strict=True)
-        rows = zip(self.rows.tolist(), cells, strict=True)
+        rows = zip(self.rows.tolist(), cells, strict=False)
         return [SourceLine(row, [*texts], fits=True) for row, texts in rows]
-
-
-@dataclass(frozen=True)
-class TextGrid(Grid):
-    """Lines of a text with as many cells each.
-
-    Attributes:
-        separator: character between cells.
-        text: the lines.
-        quoted: some cells stand in quotation marks.
-    """
-
-    separator: str
-    text: list[str]
-    quoted: bool
-
-    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
-        """Return columns by position, shape (n,) each; see `Grid`."""
-        wanted = [*columns]
-        missing = [place for place in wanted if place not in self._read]
-        floats = self._floats(missing)
-        for place in missing:
-            column = self._floats([place]) if floats is None else floats
-            if column is None:
-                column = {place: np.array(self.texts(place), object)}
-            self._read[place] = column[place]
-        return {place: self._read[place] for place in wanted}
-
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
-        mark = self.separator
-        if self.quoted:
-            return [split_line(line, mark)[column] for line in self.text]
-        return [line.split(mark, column + 1)[column].strip() for line in self.text]
-
-    def take(self, chosen: np.ndarray) -> Self:
-        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
-        if chosen.all() and not self.loose:
-            return self
-        lines = [*compress(self.text, chosen.tolist())]
-        return replace(self, rows=self.rows[chosen], text=lines, loose=[])
-
-    def has_commas(self) -> bool:
-        """Tell whether texts may have decimal commas that `read` takes for such."""
-        return self.separator != "," and any("," in line for line in self.text)
-
-    def _floats(self, columns: list[int]) -> dict[int, np.ndarray] | None:
-        """Return columns if all of their cells are finite numbers."""
-        if not self.text or not columns:
-            return {place: np.array([], object) for place in columns}
-        lines = self.text
-        if self.has_commas():
-            # Beside decimal commas a point is no part of a number.
-            text = "\n".join(lines).replace(".", "?").replace(",", ".")
-            lines = text.split("\n")
-        try:
-            table = np.loadtxt(
-                lines,
-                delimiter=self.separator,
-                usecols=columns,
-                comments=None,
-                quotechar='"' if self.quoted else None,
-                ndmin=2,
-            )
-        except ValueError:
-            return None
-        finite = len(table) == len(lines) and np.isfinite(table).all()
-        return dict(zip(columns, table.T.copy(), strict=True)) if finite else None
-
-    @cached_property
-    def _read(self) -> dict[int, np.ndarray]:
-        """Columns that were read already."""
-        return {}
-
-
-@dataclass(frozen=True)
-class ArrayGrid(Grid):
-    """Columns of arrays.
-
-    Attributes:
-        columns: numbers or objects, shape (n,) each.
-    """
-
-    columns: Sequence[np.ndarray]
-
-    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
-        """Return columns by position, shape (n,) each; see `Grid`."""
-        return {place: self._column(place) for place in columns}
-
-    def texts(self, column: int) -> list[str]:
-        """Return the cells of a column as texts without blanks around them."""
-        index, texts = self.labels(column)
-        return np.array(texts, object)[index].tolist()
-
-    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
-        """Return the index of each cell, shape (n,), and the texts in a column."""
-        index, cells = pd.factorize(self._column(column))
-        return index, [*map(stored_text, cells.tolist())]
-
-    def take(self, chosen: np.ndarray) -> Self:
-        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
-        columns = [column[chosen] for column in self.columns]
-        return replace(self, rows=self.rows[chosen], columns=columns, loose=[])
-
-    def is_numeric(self, column: int) -> bool:
-        """Tell whether the source itself states that a column holds only numbers."""
-        return self.columns[column].dtype != object
-
-    def _column(self, place: int) -> np.ndarray:
-        cells = self.columns[place]
-        stored = cells.dtype != object
-        if not stored and not all(isinstance(c, float | int) for c in cells.tolist()):
-            return cells
-        floats = cells.astype(float)
-        if np.isfinite(floats).all():
-            return floats
-        if stored:
-            cells = floats.astype(object)
-            cells[np.isnan(floats)] = ""
-        return cells
 
 
 def stored_text(cell: Any) -> str:
@@ -234,3 +118,59 @@ def split_line(line: str, separator: str) -> list[str]:
         with suppress(csv.Error):  # a cell longer than the csv module will hold
             cells = next(csv.reader([line], delimiter=separator), [])
     return [cell.strip() for cell in cells]
+
+
+def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
+    """Return the grid of a DataFrame below a row of its names.
+
+    Columns that are only counted have no headers: they are asked for by number.
+
+    Args:
+        frame: the readings.
+        first: number of its first row.
+    """
+    names = [str(name) for name in frame.columns]
+    counted = all(name.isdigit() for name in names)
+    header = () if counted else (SourceLine(first - 1, names, fits=True),)
+    rows = np.arange(len(frame)) + (first - 1 if counted else first)
+    columns = [_plain_column(frame.iloc[:, i]) for i in range(len(names))]
+    return Grid(rows, columns, header)
+
+
+def memory_grid(data: Any, findings: FileFindings) -> tuple[Grid, str]:
+    """Return the grid of a table in memory, and the hash of its cells.
+
+    Raises:
+        InputError: arrays of several lengths or dimensions; headers of several levels.
+    """
+    if hasattr(data, "to_pandas"):
+        data = data.to_pandas()
+    try:
+        frame = pd.DataFrame(data)
+    except (ValueError, TypeError) as error:
+        remedy = "Give arrays of one length and one dimension, by name"
+        findings.refuse(f"is no table ({error})", remedy)
+    if frame.columns.nlevels > 1:
+        remedy = "Name each by one text, as in frame.columns.map('_'.join)"
+        findings.refuse("has columns of several levels", remedy)
+    if any(name is not None for name in frame.index.names):
+        frame = frame.reset_index()
+    text = frame.to_csv(index=False)
+    return frame_grid(frame), hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain_column(column: pd.Series) -> np.ndarray:
+    """Return a column of a DataFrame as `Grid` holds it."""
+    types = pd.api.types
+    if types.is_numeric_dtype(column) and not types.is_bool_dtype(column):
+        return column.to_numpy(float, na_value=np.nan)
+    if isinstance(column.dtype, pd.CategoricalDtype):
+        cells = _plain_column(column.cat.categories.to_series())
+        # The code of an empty cell is -1.
+        return np.append(cells.astype(object), "")[column.cat.codes]
+    objects = column.astype(object).where(column.notna(), "").to_numpy()
+    cells = [
+        c if isinstance(c, int | float) and c is not True else stored_text(c)
+        for c in objects
+    ]
+    return np.array(cells, object)

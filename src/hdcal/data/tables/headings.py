@@ -23,7 +23,6 @@ class Heading(NamedTuple):
     Attributes:
         names: with their units in brackets, shape (c,).
         bare: the names as written, shape (c,).
-        titles: cells of the line above the names, shape (c,).
         row: row of the names in the source; 0 where there are none.
         last: row of the last of names and units.
         unit_row: row of the units; None without one.
@@ -33,7 +32,6 @@ class Heading(NamedTuple):
 
     names: tuple[str, ...]
     bare: tuple[str, ...] = ()
-    titles: tuple[str, ...] = ()
     row: int = 0
     last: int = 0
     unit_row: int | None = None
@@ -54,6 +52,8 @@ def find_heading(
         width: cells of a reading.
         first: heading of the first block, for those of later ones.
     """
+    if first is not None and not first.row:
+        return None
     near = lines[-_NEAR:]
     units = next((one for one in reversed(lines) if _is_unit_line(one, near)), None)
     cells = _padded(units.cells if units is not None else [], width)
@@ -74,11 +74,9 @@ def find_heading(
     below = [one for one in lines if one != units and one.row > best.row]
     if not quantities and (first or not all(one.counts for one in below)):
         return None
-    above = [line.cells for line in lines if line.row == best.row - 1]
     return Heading(
         names=tuple(map(_with_unit, bare, texts)),
         bare=bare,
-        titles=tuple(_padded(above[0] if above else [], width)),
         row=best.row,
         last=last,
         unit_row=None if units is None else units.row,

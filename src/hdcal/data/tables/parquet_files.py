@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.arrays import frame_grid
-from hdcal.data.tables.grid import ArrayGrid
-from hdcal.data.tables.headers import parse_header
-from hdcal.errors import InputError, quoted
+from hdcal.data.tables.grid import Grid, frame_grid
 
 if TYPE_CHECKING:
     from pyarrow import Schema, Table
@@ -50,7 +47,7 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     """Return files as one table; names of folders such as `lot=7` are texts.
 
     Raises:
-        InputError: they cannot be read, or a column is of several kinds.
+        InputError: they cannot be read, or their columns are of different kinds.
     """
     try:
         import pyarrow as arrow
@@ -68,39 +65,17 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     try:
         table = tables.dataset([*files], format="parquet", **split if keys else {})
         schemas = [one.physical_schema for one in table.get_fragments()]
-        return table.replace_schema(_joined([*schemas, kinds], files, findings))
-    except InputError:
-        raise
     except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(
-            f"is no Parquet file that can be read ({error})", "Save it anew"
-        )
-
-
-def _joined(
-    schemas: Sequence["Schema"], files: Sequence[str], findings: FileFindings
-) -> "Schema":
-    """Return the columns of all files; one that is read and has several is refused."""
-    import pyarrow as arrow
-
-    joined = []
-    for name in dict.fromkeys(name for schema in schemas for name in schema.names):
-        with_it = ((i, one) for i, one in enumerate(schemas) if name in one.names)
-        each = [(i, one.field(name)) for i, one in with_it]
+        words = f"is no Parquet file that can be read ({error})"
+        findings.refuse(words, "Save it anew")
+    schema = arrow.schema([])
+    for name, one in zip([*files, root], [*schemas, kinds], strict=True):
         try:
             # A column that is empty in a file, or narrower, is no other kind.
-            several = [arrow.schema([field]) for _, field in each]
-            schema = arrow.unify_schemas(several, promote_options="permissive")
-            joined.append(schema.field(0))
-        except arrow.ArrowTypeError:
-            first = each[0][1].type
-            at, other = next((i, f.type) for i, f in each if f.type != first)
-            words = f"{quoted(name)} is {other} in {files[at]}, {first} before"
-            if parse_header(name).quantity:
-                findings.add(words, "Save it anew")
-    if findings:
-        raise InputError(findings)
-    return arrow.schema(joined)
+            schema = arrow.unify_schemas([schema, one], promote_options="permissive")
+        except arrow.ArrowTypeError as error:
+            findings.refuse(f"other columns in {name} ({error})", "Save it anew")
+    return table.replace_schema(schema)
 
 
 def plain_columns(schema: "Schema") -> list[str]:
@@ -121,7 +96,7 @@ def frame_of(table: "Table") -> pd.DataFrame:
     return table.to_pandas()
 
 
-def parquet_grid(path: Path, findings: FileFindings) -> ArrayGrid:
+def parquet_grid(path: Path, findings: FileFindings) -> Grid:
     """Return the grid of a Parquet file.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Tables in other shapes: units in cells, specimens side by side."""
+"""The table in a grid, with the units that stand in cells."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable, find_table
 from hdcal.data.tables.cells import unit_in
-from hdcal.data.tables.grid import ArrayGrid, Grid
+from hdcal.data.tables.grid import Grid
 from hdcal.data.tables.headers import parse_header
 from hdcal.data.tables.headings import UNIT_LABELS
 from hdcal.data.units import find_unit
@@ -19,16 +19,11 @@ _SHOWN = 50
 
 
 def table_of(grid: Grid, findings: FileFindings) -> ReadTable:
-    """Return the table in a grid, whatever its shape."""
-    table, titles = find_table(grid, findings)
-    return _stacked(_with_units(table, findings), titles)
-
-
-def _with_units(table: ReadTable, findings: FileFindings) -> ReadTable:
-    """Return a table whose headers have the units from columns behind them, or cells.
+    """Return the table in a grid; headers have the units of cells or columns of units.
 
     A unit that changes from row to row, or differs from the header's, is a finding.
     """
+    table = find_table(grid, findings)
     headers, notes = [*table.headers], [*table.notes]
 
     def refuse(name: str, units: Sequence[str]) -> None:
@@ -59,36 +54,3 @@ def _with_units(table: ReadTable, findings: FileFindings) -> ReadTable:
         elif units and header.quantity:
             refuse(name, [known, *units[:3]] if known else units[:3])
     return replace(table, headers=tuple(headers), notes=tuple(notes))
-
-
-def _stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
-    """Return a table with each column once, where specimens stand side by side.
-
-    The titles, of the line above the headers, may name the specimens.
-    """
-    headers, width = table.headers, len(table.headers)
-    periods = [p for p in range(2, width // 2 + 1) if width % p == 0]
-    period = next((p for p in periods if headers[:p] * (width // p) == headers), 0)
-    if not period or not all(headers) or len({*headers[:period]}) < period:
-        return table
-    cells = table.grid.read(range(width))
-    names, rows, blocks = [], [], []
-    for start in range(0, width, period):
-        each = np.array([cells[start + k] for k in range(period)], object)
-        filled = np.any(each != "", axis=0)
-        names.append(titles[start] or str(start // period + 1))
-        rows.append(table.rows[filled])
-        label = np.full((1, filled.sum()), names[-1], object)
-        blocks.append(np.concatenate([each[:, filled], label]))
-    columns = np.concatenate(blocks, axis=1)
-    grid = ArrayGrid(np.concatenate(rows), period + 1, [], [*columns])
-    note = f"{len(names)} specimens stand side by side: {', '.join(map(quoted, names))}"
-    return replace(
-        table,
-        headers=(*headers[:period], "specimen"),
-        grid=grid,
-        filled=len(grid.rows),
-        empty=frozenset(),
-        notes=(*table.notes, note),
-        runs=None,
-    )

@@ -10,25 +10,23 @@ import pandas as pd
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
-from hdcal.data.tables.arrays import NAME, mat_grid, memory_grid
 from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.grid import memory_grid
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
 from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text import LARGEST_FILE, decode, read_bytes, text_grid
-from hdcal.data.tables.workbook import refuse_formulas, sheet_grid, sheets_like
+from hdcal.data.tables.workbook import sheet_grid
 
-_WORKBOOK, _OLD_WORKBOOK = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
-_MATLAB, _HDF5 = b"MATLAB 5.0", b"\x89HDF"
+# What findings call a table in memory.
+IN_MEMORY = "DataFrame"
+_WORKBOOK = b"PK\x03\x04"
+# First bytes of files that are no text.
 _KINDS = {
     _WORKBOOK: "a workbook",
-    _OLD_WORKBOOK: "an old workbook (.xls)",
     PARQUET: "a Parquet file",
-    _MATLAB: "a .mat file",
-    _HDF5: "an HDF5 file, as MATLAB writes it since version 7.3",
-}
-_NOT_READ = {
-    _OLD_WORKBOOK: "Open it and save it as .xlsx or CSV",
-    _HDF5: "Save it with -v7, or as CSV",
+    b"\xd0\xcf\x11\xe0": "an old workbook (.xls)",
+    b"MATLAB 5.0": "a MATLAB file (.mat)",
+    b"\x89HDF": "an HDF5 file",
 }
 
 
@@ -36,11 +34,6 @@ def is_frame(data: Any) -> bool:
     """Tell whether this is a table in memory: a data frame, or arrays by name."""
     kinds = "to_csv", "to_pandas"
     return isinstance(data, Mapping) or any(hasattr(data, name) for name in kinds)
-
-
-def source_name(data: Any) -> str:
-    """Return the name of a source in findings."""
-    return NAME if is_frame(data) else str(data)
 
 
 def read_source(
@@ -76,28 +69,19 @@ def read_source(
 
 
 def text_of(path: Path, sheet: str | None = None) -> bytes:
-    """Return the bytes of a text file as they are, of any other the table as text.
-
-    Of several sheets, by a name with an asterisk, each is a specimen.
-    """
+    """Return the bytes of a text file as they are, of any other the table as text."""
     if not _kind(path):
         return path.read_bytes()
     with FileFindings(str(path)) as findings:
-        several = "*" in (pattern := sheet or "")
-        sheets = sheets_like(path, findings, pattern)[0] if several else [sheet]
-        tables = [read_source(path, findings, sheet=name)[0] for name in sheets]
-        headers, width = tables[0].headers, len(tables[0].headers)
-        if any(table.headers != headers for table in tables):
-            findings.refuse("the sheets have different columns", "Name one of them")
-    frames = []
-    for name, table in zip(sheets, tables, strict=True):
-        columns: dict[Any, Any] = dict(enumerate(map(table.grid.texts, range(width))))
-        if table.runs is not None and "run" not in headers:
-            columns["run"] = (table.runs + 1).astype(str)
-        frames.append(pd.DataFrame(columns | ({"specimen": name} if several else {})))
-    whole = pd.concat(frames).fillna({"run": "1"})
-    whole = whole.rename(columns=dict(enumerate(headers)))
-    return whole.to_csv(sep="\t", index=False, header=tables[0].named).encode()
+        table, _ = read_source(path, findings, sheet=sheet)
+    columns: Any = dict(enumerate(map(table.grid.texts, range(table.grid.width))))
+    headers = [*table.headers]
+    if table.runs is not None and "run" not in headers:
+        columns["run"] = (table.runs + 1).astype(str)
+        headers.append("run")
+    frame = pd.DataFrame(columns)
+    shown = headers if table.named else False
+    return frame.to_csv(sep="\t", index=False, header=shown).encode()
 
 
 def _kind(path: Path) -> bytes:
@@ -117,14 +101,12 @@ def _file_table(
         findings.refuse(words, "Leave it out")
     if kind != _WORKBOOK and sheet is not None:
         findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
-    if kind in _NOT_READ:
-        findings.refuse(f"is {_KINDS[kind]}", _NOT_READ[kind])
     if kind == _WORKBOOK:
         grid, notes = sheet_grid(path, findings, sheet)
     elif kind == PARQUET:
         grid = parquet_grid(path, findings)
-    elif kind == _MATLAB:
-        grid, notes = mat_grid(path, findings)
+    elif kind:
+        findings.refuse(f"is {_KINDS[kind]}", "Save it as .xlsx or CSV")
     else:
         raw = read_bytes(path, findings, wide=encoding is not None)
         text, guessed = decode(raw, findings, encoding)
@@ -134,8 +116,6 @@ def _file_table(
         grid, notes = text_grid(text)
         notes = [*guessed, *notes]
     table = table_of(grid, findings)
-    if kind == _WORKBOOK and any(table.headers[place] for place in table.empty):
-        refuse_formulas(path, findings)
     with open(path, "rb") as stream:
         sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
     return replace(table, notes=(*notes, *table.notes)), sha256

@@ -3,18 +3,16 @@
 import codecs
 import re
 from collections import Counter
-from itertools import compress
 from pathlib import Path
 
 import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import SEPARATORS, SourceLine, TextGrid, split_line
+from hdcal.data.tables.grid import SEPARATORS, Grid, SourceLine, split_line
 
-LONGEST_LINE = 1 << 20
-LARGEST_FILE = 1 << 32
-_CHUNK = 1 << 18
+LARGEST_FILE = 1 << 30
+_LONG_LINE = re.compile(rb"[^\r\n]{1048577}")
 # Encodings that test machines write other than Unicode: Western Europe, China, Japan.
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
@@ -38,25 +36,19 @@ _GAP = re.compile(r"\s{2,}")
 
 
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
-    """Return the bytes of a text; give up at the first sign that it is no table.
+    """Return the bytes of a text.
 
     Raises:
         InputError: the file is binary, or has a line over 1 MiB.
     """
-    kept, line, row = [], 0, 1
-    with open(path, "rb") as stream:
-        while chunk := stream.read(_CHUNK):
-            wide = wide or (not kept and chunk.startswith(_WIDE_MARKS))
-            if not wide and b"\0" in chunk:
-                findings.refuse("is a binary file", "Save it as UTF-8 text")
-            last = max(chunk.rfind(b"\n"), chunk.rfind(b"\r"))
-            line = line + len(chunk) if last < 0 else len(chunk) - last - 1
-            if line > LONGEST_LINE:
-                row += sum(part.count(b"\n") for part in kept)
-                words = "has a line of more than 1 MiB, so it is no table of readings"
-                findings.refuse(words, "Write one row of readings per line", row)
-            kept.append(chunk)
-    return b"".join(kept)
+    raw = path.read_bytes()
+    if not (wide or raw.startswith(_WIDE_MARKS)) and b"\0" in raw:
+        findings.refuse("is a binary file", "Save it as UTF-8 text")
+    if found := _LONG_LINE.search(raw):
+        words = "has a line of more than 1 MiB, so it is no table of readings"
+        row = raw.count(b"\n", 0, found.start()) + 1
+        findings.refuse(words, "Write one row of readings per line", row)
+    return raw
 
 
 def decode(
@@ -111,7 +103,7 @@ def _likely(raw: bytes) -> str:
     return best.encoding if best is not None else _ENCODINGS[0]
 
 
-def text_grid(text: str) -> tuple[TextGrid, list[str]]:
+def text_grid(text: str) -> tuple[Grid, list[str]]:
     """Return the grid of a text, and notes on what was assumed.
 
     The separator is that of most lines of numbers; without such lines, that of the
@@ -128,32 +120,25 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
         separator = max(";\t", key=first.count)
         separator = separator if separator in first else ","
         width = len(split_line(first, separator))
-    counts = np.fromiter((line.count(separator) for line in lines), int, len(lines)) + 1
-    quoted = '"' in text
-    for index in (i for i, line in enumerate(lines) if quoted and '"' in line):
-        # No line with an open quotation mark is one of readings.
-        is_open = lines[index].count('"') % 2
-        counts[index] = 0 if is_open else len(split_line(lines[index], separator))
-    widest = _heading_width(lines, separator, counts, width)
-    fits = (counts >= width) & (counts <= widest)
-    for index in np.flatnonzero(fits & (counts < widest)):
-        lines[index] += separator * int(widest - counts[index])
-    # Most lines begin with a digit or a letter.
-    blank = (line[:1] in _BLANKS and not line.strip(_BLANKS) for line in lines)
-    empty = np.fromiter(blank, bool, len(lines))
-    loose = [
-        SourceLine(index + 1, _cells_of(lines[index], separator), fits=False)
-        for index in np.flatnonzero(~fits & ~empty).tolist()
+    is_open = [line.count('"') % 2 == 1 for line in lines]
+    cells = [
+        [line] if alone else split_line(line, separator)
+        for line, alone in zip(lines, is_open, strict=True)
     ]
-    kept = fits & ~empty
-    text_lines = [*compress(lines, kept.tolist())]
-    rows = np.flatnonzero(kept) + 1
-    return TextGrid(rows, widest, loose, separator, text_lines, quoted), notes
-
-
-def _cells_of(line: str, separator: str) -> list[str]:
-    """Return the cells of a line, or the line where a quotation mark stays open."""
-    return [line] if line.count('"') % 2 else split_line(line, separator)
+    # No line with an open quotation mark is one of readings.
+    counts = np.where(is_open, 0, [*map(len, cells)])
+    filled = np.array([bool(line.strip(_BLANKS)) for line in lines])
+    widest = _heading_width(cells, counts, width)
+    fits = filled & (counts >= width) & (counts <= widest)
+    loose = tuple(
+        SourceLine(row + 1, cells[row], fits=False)
+        for row in np.flatnonzero(filled & ~fits).tolist()
+    )
+    rows = np.flatnonzero(fits)
+    padded = [cells[row] + [""] * int(widest - counts[row]) for row in rows.tolist()]
+    columns = [np.array(column, object) for column in zip(*padded, strict=True)]
+    columns = columns or [np.array([], object)] * widest
+    return Grid(rows + 1, columns, loose, separator), notes
 
 
 def _dialect(lines: list[str]) -> tuple[str, int]:
@@ -168,7 +153,8 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
     tabs = any("\t" in line.strip() for line in sample)
     most, best = 0, ("", 0)
     for separator in SEPARATORS if tabs else SEPARATORS + " ":
-        shares = [*filter(None, (_numbers(line, separator) for line in sample))]
+        parted = (_numbers(_parted(line, separator)) for line in sample)
+        shares = [share for share in parted if share is not None]
         if not shares or (separator == " " and len(shares) < _FEWEST):
             continue
         width, count = Counter(cells for cells, _ in shares).most_common(1)[0]
@@ -177,34 +163,36 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
     return best
 
 
-def _numbers(line: str, separator: str) -> tuple[int, float] | None:
+def _numbers(cells: list[str]) -> tuple[int, float] | None:
     """Return the number of cells of a line, and the share of numbers among filled ones.
 
     None of a line with fewer than two numbers.
     """
-    if separator == " ":
-        cells = line.split()
-        # A comma at the end of a number separates it from the next.
-        if not all(is_number(cell) and cell == cell.strip(",") for cell in cells):
-            return None
-    else:
-        cells = split_line(line, separator)
     numbers = sum(map(is_number, cells))
     return (len(cells), numbers / sum(map(bool, cells))) if numbers >= 2 else None
 
 
-def _heading_width(
-    lines: list[str], separator: str, counts: np.ndarray, width: int
-) -> int:
+def _parted(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; none of one that blanks do not part into numbers."""
+    if separator != " ":
+        return split_line(line, separator)
+    cells = line.split()
+    # A comma at the end of a number separates it from the next.
+    plain = all(is_number(cell) and cell == cell.strip(",") for cell in cells)
+    return cells if plain else []
+
+
+def _heading_width(cells: list[list[str]], counts: np.ndarray, width: int) -> int:
     """Return the cells of a line of headers, some of which may name remarks."""
-    likely = np.flatnonzero(counts == width).tolist()
-    shares = ((i, _numbers(lines[i], separator)) for i in likely)
-    # Names of gauges may be numbers too, but not most of them.
-    first = next((i for i, one in shares if one is not None and one[1] > 0.5), 0)
-    begins = ((i, split_line(lines[i], separator)[0]) for i in range(first))
-    above = [i for i, cell in begins if lines[i].strip() and not is_number(cell)]
-    header = int(counts[above[-1]]) if above else width
-    return header if width < header <= width + _MOST_REMARKS else width
+    header = width
+    for row, count in enumerate(counts.tolist()):
+        # Names of gauges may be numbers too, but not most of them.
+        share = _numbers(cells[row]) if count == width else None
+        if share is not None and share[1] > 0.5:
+            return header if width < header <= width + _MOST_REMARKS else width
+        if "".join(cells[row]) and not is_number(cells[row][0]):
+            header = count
+    return width
 
 
 def _tabbed(line: str, width: int) -> str:

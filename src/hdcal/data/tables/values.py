@@ -47,21 +47,17 @@ def read_values(
 def without_slow_channels(
     table: ReadTable, used: Mapping[str, Column], required: tuple[str, ...]
 ) -> tuple[ReadTable, dict[str, Column], list[str]]:
-    """Return the rows in which slow channels were read as well.
+    """Return the rows in which slow channels were read as well, and notes on the rest.
 
     A channel that is read more seldom than others leaves most of its cells empty. Where
     it is no required one, it is not used.
-
-    Returns:
-        The rows, the columns that are used, and notes on what is left out.
     """
     kept, left, notes = np.ones(len(table.rows), bool), dict(used), []
-    numeric = {q: column for q, column in used.items() if q not in LABELS}
-    cells = table.grid.read(column.position for column in numeric.values())
-    for quantity, column in numeric.items():
-        if cells[column.position].dtype != object:
+    for quantity, column in used.items():
+        cells = table.grid.read(column.position)
+        if quantity in LABELS or cells.dtype != object:
             continue
-        filled = np.array([cell != "" for cell in cells[column.position].tolist()])
+        filled = np.array([cell != "" for cell in cells.tolist()])
         if not len(filled) or filled.mean() > _SLOW:
             continue
         if quantity in required and not _is_regular(filled):
@@ -87,23 +83,15 @@ def _numbers(
 ) -> dict[str, np.ndarray]:
     """Return the columns of numbers in the units of the file."""
     numeric = {name: column for name, column in used.items() if name not in LABELS}
-    cells = table.grid.read(column.position for column in numeric.values())
-    odd = {place for place, column in cells.items() if column.dtype == object}
-    if odd and table.grid.has_commas():
-        # One decimal mark serves all columns: some may have been read by another.
-        cells = {place: np.array(table.grid.texts(place), object) for place in cells}
-        odd = {*cells}
-    comma = bool(odd) and has_comma(cells.values())
+    cells = {name: table.grid.read(one.position) for name, one in numeric.items()}
+    comma = has_comma(cells.values())
     values = {}
     for name, column in numeric.items():
-        numbers, faults = cells[column.position], []
-        if column.position in odd:
-            numbers, faults = read_numbers(numbers, comma)
+        values[name], faults = read_numbers(cells[name], comma)
         # Beside decimal commas a point was refused.
-        if not comma and not faults and may_hold_thousands(numbers):
+        if not comma and not faults and may_hold_thousands(values[name]):
             faults = thousands(table.grid.texts(column.position))
         _add(table, faults, column, findings)
-        values[name] = numbers
     return values
 
 

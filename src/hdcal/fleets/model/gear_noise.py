@@ -1,8 +1,9 @@
 """Noise of the readings of every gear: ordinary gears differ little, a few a lot.
 
-ν degrees of freedom with the standard deviation s tell −ν (log σ + ½ s²/σ²) of the
-noise σ of a gear. log σ is normal about the centre of all gears; of an odd gear it is
-wider by √(1 + ratio²). σ is integrated by Gauss and Hermite's rule about its mode.
+The log likelihood of the noise σ of a gear is −ν (log σ + ½ s²/σ²), given its residual
+sd s with ν degrees of freedom. log σ is normal about the centre of all gears; of an odd
+gear it is wider by √(1 + ratio²). σ is integrated by Gauss and Hermite's rule about its
+mode.
 """
 
 from collections.abc import Mapping
@@ -45,7 +46,7 @@ class GearNoise(Sampled):
     log_sd: Float[Array, " g"]
 
     def some(self, gears: np.ndarray) -> "GearNoise":
-        """Return the residuals of some gears, by their indices."""
+        """Return the residuals of the gears with these indices."""
         return replace(self, freedom=self.freedom[gears], log_sd=self.log_sd[gears])
 
     def declare(self) -> None:
@@ -55,19 +56,14 @@ class GearNoise(Sampled):
 
 
 class NoisePosterior(NamedTuple):
-    """Each gear given one draw of the population; [gear, node, kind].
-
-    Attributes:
-        log_joint: log density of its residuals, of the node and of its kind.
-        log_sd: logarithm of its noise sd.
-    """
+    """Joint log density of residuals, node and kind of a gear, and log noise sd."""
 
     log_joint: Float[Array, "g u k"]
     log_sd: Float[Array, "g u k"]
 
 
 def noise_posterior(problem: GearNoise, values: Mapping) -> NoisePosterior:
-    """Return what the residuals of each gear tell, given one draw of the population."""
+    """Return the posterior of the noise of gears, given one draw of the population."""
     wide = jnp.stack([jnp.ones(()), jnp.sqrt(1.0 + values["off_ratio"] ** 2)])
     spread = values["spread"] * wide
     own = (problem.log_sd - jnp.log(values["centre"]))[:, None]
@@ -130,10 +126,6 @@ def gear_noise(
     problem: GearNoise, values: Mapping
 ) -> tuple[NoiseNodes, np.ndarray, np.ndarray]:
     """Return the noise of each gear, averaged over draws of the population.
-
-    Args:
-        problem: the residuals.
-        values: draws of the population by site, shape (t,).
 
     Returns:
         Nodes of the noise sd; its median, shape (g,) [N]; and the probability of each

@@ -39,12 +39,7 @@ MOST_FALSE = 0.25
 
 
 class NoiseNodes(eqx.Module):
-    """Noise sd of the readings of each gear as nodes with weights.
-
-    Attributes:
-        sd: [N]; [gear, node].
-        log_weight: of each node.
-    """
+    """Noise sd of the readings of each gear [N] as nodes with weights."""
 
     sd: Float[Array, "g u"]
     log_weight: Float[Array, " u"]
@@ -107,13 +102,7 @@ class GearQuantity(Sampled):
 
 
 class GearPosterior(NamedTuple):
-    """Each gear given one draw of the population; [gear, node, kind].
-
-    Attributes:
-        log_joint: log density of its rows, its noise node and its kind.
-        mean: of θ.
-        sd: of θ.
-    """
+    """Joint log density of rows, noise node and kind of a gear; mean and sd of θ."""
 
     log_joint: Float[Array, "g u k"]
     mean: Float[Array, "g u k"]
@@ -121,7 +110,7 @@ class GearPosterior(NamedTuple):
 
 
 def gear_posterior(problem: GearQuantity, values: Mapping) -> GearPosterior:
-    """Return what the rows of each gear tell, given one draw of the population."""
+    """Return the posterior of θ of each gear, given one draw of the population."""
     lot = group_offsets(values, "lot")[problem.lot][:, None]
     rig = group_offsets(values, "rig")[problem.rig]
     operator = group_offsets(values, "operator")[problem.operator]
@@ -162,12 +151,7 @@ def _(problem: GearQuantity, values: Mapping) -> Float[Array, ""]:
 
 
 class DrawnGears(NamedTuple):
-    """Draws of every gear, one for each draw of the population; [draw, gear].
-
-    Attributes:
-        apart: θ, the distance from the centre.
-        off: probability of the gear being odd.
-    """
+    """θ of every gear, and its probability of being odd, for each population draw."""
 
     apart: Float[Array, "t g"]
     off: Float[Array, "t g"]
@@ -175,13 +159,7 @@ class DrawnGears(NamedTuple):
 
 @jit
 def draw_gears(problem: GearQuantity, values: Mapping, seed: int) -> DrawnGears:
-    """Draw every gear from its posterior given each draw of the population.
-
-    Args:
-        problem: the gears.
-        values: draws of the population by site, shape (t,).
-        seed: of the draws.
-    """
+    """Draw every gear from its posterior given each draw of the population, (t,)."""
 
     def one(drawn):
         draw, key = drawn

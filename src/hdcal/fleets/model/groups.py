@@ -31,13 +31,7 @@ _NOTHING = 1e-6
 
 
 class Grouping(eqx.Module):
-    """Estimates of groups, which shape the coordinates of the sampler only.
-
-    Attributes:
-        basis: orthonormal contrasts of the groups, [group, contrast].
-        estimate: of each contrast.
-        variance: of the estimate.
-    """
+    """Estimates of orthonormal contrasts, which shape the coordinates only."""
 
     basis: Float[Array, "k c"]
     estimate: Float[Array, " c"]
@@ -56,13 +50,7 @@ def grouping(means: np.ndarray, covariance: np.ndarray) -> Grouping:
 
 
 def sample_offsets(kind: str, groups: Grouping, sd) -> dict:
-    """Sample the distance of each group from the mean of all, as `kind`_1, ….
-
-    Args:
-        kind: lot, rig or operator.
-        groups: estimates.
-        sd: scatter of the groups.
-    """
+    """Sample the distance of each group from the mean of all, as `kind`_1, …."""
     weight = sd**2 / (sd**2 + groups.variance)
     scale = jnp.sqrt(weight * groups.variance)
     plain, places = dist.Normal(0.0, 1.0), range(1, len(groups.basis))
@@ -83,13 +71,10 @@ def sample_offsets(kind: str, groups: Grouping, sd) -> dict:
 def group_offsets(values: Mapping, kind: str) -> Float[Array, "k ..."]:
     """Return the distance of each group from the mean of all; a zero without groups.
 
-    Args:
-        values: of one draw or of many.
-        kind: lot, rig or operator.
+    The values are one draw or many by site; the kind is lot, rig or operator.
     """
-    names = [
-        f"{kind}_{k}" for k in range(1, len(values) + 1) if f"{kind}_{k}" in values
-    ]
+    names = [name for name in values if name.removeprefix(f"{kind}_").isdigit()]
+    names.sort(key=lambda name: int(name.removeprefix(f"{kind}_")))
     if not names:
         return jnp.zeros_like(next(iter(values.values())))[None]
     return jnp.stack([values[name] for name in names])
@@ -108,12 +93,7 @@ def distinguished(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
 
 
 def medians_of_groups(values: np.ndarray, group: np.ndarray) -> Grouping:
-    """Return groups by their medians, which odd members do not move.
-
-    Args:
-        values: of each member, shape (n,).
-        group: index of the group of each member, shape (n,).
-    """
+    """Return groups of members by their medians, which odd members do not move."""
     middle = _medians(values, group)
     sd = robust_sd(values - middle[group])
     least = _NOTHING * np.max(np.abs(values))
@@ -149,12 +129,12 @@ def gains_of_rigs(
     return grouping(covariance @ pull, covariance)
 
 
-def linked_rigs(gear: np.ndarray, rig: np.ndarray) -> np.ndarray:
-    """Return a label of each rig, equal for rigs that gears link, shape (k,)."""
-    gears, rigs = 1 + int(gear.max()), 1 + int(rig.max())
-    shape = gears + rigs, gears + rigs
-    links = scipy.sparse.coo_array((np.ones(len(gear)), (gear, gears + rig)), shape)
-    return scipy.sparse.csgraph.connected_components(links, directed=False)[1][gears:]
+def rigs_are_linked(gear: np.ndarray, rig: np.ndarray) -> bool:
+    """Return whether gears that several rigs measured compare all of the rigs."""
+    gears, size = 1 + int(gear.max()), 2 + int(gear.max()) + int(rig.max())
+    links = np.ones(len(gear)), (gear, gears + rig)
+    links = scipy.sparse.coo_array(links, (size, size))
+    return scipy.sparse.csgraph.connected_components(links, directed=False)[0] == 1
 
 
 def robust_sd(values: np.ndarray) -> float:

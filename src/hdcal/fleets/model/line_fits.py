@@ -14,7 +14,7 @@ import numpy as np
 from hdcal.fleets.reading.mounting_sums import MountingSums
 
 # Square of a term beside the terms before it, relative to its whole square, below
-# which the readings do not tell its size.
+# which the readings do not determine its size.
 _COLLINEAR = 0.02
 # Degrees of freedom that must be left beside line, loop and bend.
 _LEAST_FREE = 4.0
@@ -22,22 +22,19 @@ _LEAST_FREE = 4.0
 _ROUNDING = 1e-12
 # Pooled correlation of neighbours that is taken into account: larger than this, and
 # than so many standard errors.
-_LEAST_CORRELATION, _CLEAR, _MOST_CORRELATION = 0.2, 4.0, 0.99
+_LEAST_CORRELATION, _CLEAR, MOST_CORRELATION = 0.2, 4.0, 0.99
 
 
 @dataclass(frozen=True)
 class LineFits:
-    """One entry for each gear on each rig on which it moved.
+    """One entry for each gear on each rig on which it moved; errors are variances / σ².
 
     Attributes:
         gear: index of the gear, ascending.
         rig: index of the rig.
-        slope: [N/mm as read].
-        slope_error: its variance over σ², widened for the correlation [1/mm²].
+        slope: [N/mm as read]; its error is widened for the correlation, as all are.
         loop: force of loading above unloading [N]; NaN where it is not known.
-        loop_error: its variance over σ².
         bend: [N]; NaN where it is not known.
-        bend_error: its variance over σ².
         freedom: degrees of freedom of the noise of each gear, shape (g,).
         log_sd: logarithm of the residual sd of each gear [N], shape (g,).
         correlation: of neighbouring residuals, pooled; 0 where it is not clear.
@@ -58,7 +55,7 @@ class LineFits:
     @property
     def widening(self) -> float:
         """Factor of variances due to the correlation of neighbours."""
-        return (1.0 + self.correlation) / (1.0 - self.correlation)
+        return widening(self.correlation)
 
 
 def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFits:
@@ -73,47 +70,53 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
     rigs, gears = 1 + int(rig.max()), 1 + int(sums.gear.max())
     pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)
     gear, of_rig = np.divmod(pairs, rigs)
-    products = _summed(sums.products, pair, len(pairs))
+    products, lagged = (
+        _summed(each, pair, len(pairs)) for each in (sums.products, sums.lagged)
+    )
     free = np.bincount(pair, sums.rows - 1.0)
-    line, bend = _fit(products, (0, 1, 2), free), _fit(products, (0, 2, 1), free)
-    squares = _quadratic(products, line.residual, line.residual)
+    line = fit_terms(products, (0, 1, 2), free)
+    bend = fit_terms(products, (0, 2, 1), free)
+    squares = np.maximum(line.squares(products), 0.0)
     freedom, square = (
         np.bincount(gear, values, gears)
-        for values in (free - line.known.sum(axis=1), np.maximum(squares, 0.0))
+        for values in (free - line.known.sum(axis=1), squares)
     )
     exact = square <= _ROUNDING * np.bincount(gear, products[:, 3, 3], gears)
     square = np.where(exact, freedom * step**2 / 12.0, square)
     known = (freedom > 0.0) & (square > 0.0)
     variance = np.where(known, square, 1.0) / np.where(known, freedom, 1.0)
-    lagged = _summed(sums.lagged, pair, len(pairs))
-    follow = _quadratic(lagged, line.residual, line.residual) / variance[gear]
+    follow = line.squares(lagged) / variance[gear]
     correlation = _correlation(follow[known[gear]], freedom[known])
-    widening = (1.0 + correlation) / (1.0 - correlation)
-    moved, swing = line.known[:, 0], _swing(sums)
+    wider, moved, swing = widening(correlation), line.known[:, 0], _swing(sums)
     return LineFits(
         gear=gear[moved],
         rig=of_rig[moved],
         slope=line.size[moved, 0],
-        slope_error=widening * line.error[moved, 0],
+        slope_error=wider * line.error[moved, 0],
         # The sense is ±1: a loop is twice its coefficient.
         loop=2.0 * bend.size[moved, 2],
-        loop_error=4.0 * widening * bend.error[moved, 2],
+        loop_error=4.0 * wider * bend.error[moved, 2],
         bend=swing * line.size[moved, 2],
-        bend_error=swing**2 * widening * line.error[moved, 2],
-        freedom=np.where(known, freedom, 0.0) / widening,
+        bend_error=swing**2 * wider * line.error[moved, 2],
+        freedom=np.where(known, freedom, 0.0) / wider,
         log_sd=0.5 * np.log(variance),
         correlation=correlation,
     )
 
 
-class _Fit(NamedTuple):
+def widening(correlation):
+    """Return the factor of variances of means of noise with correlated neighbours."""
+    return (1.0 + correlation) / (1.0 - correlation)
+
+
+class TermFits(NamedTuple):
     """Coefficients of terms, each beside those before it, of p curves.
 
     Attributes:
         size: coefficient; NaN where it is not known; shape (p, 3).
         error: its variance over σ²; shape (p, 3).
-        known: which terms the readings tell apart; shape (p, 3).
-        residual: the residual as a combination of (x, sense, x|x|, y); shape (p, 4).
+        known: which terms the readings distinguish; shape (p, 3).
+        residual: the residual as a combination of v; shape (p, 4).
     """
 
     size: np.ndarray
@@ -121,11 +124,22 @@ class _Fit(NamedTuple):
     known: np.ndarray
     residual: np.ndarray
 
+    def squares(self, products: np.ndarray) -> np.ndarray:
+        """Return the sum of squares of residuals, or of another product, shape (p,)."""
+        return _quadratic(products, self.residual, self.residual)
 
-def _fit(products: np.ndarray, order: tuple[int, ...], free: np.ndarray) -> _Fit:
+
+def fit_terms(
+    products: np.ndarray, order: tuple[int, ...], free: np.ndarray
+) -> TermFits:
     """Fit terms in an order, each to what those before it leave.
 
     The slope comes first: it is that of the straight line alone.
+
+    Args:
+        products: of v, shape (p, 4, 4).
+        order: of x, sense and x|x|, by their places in v.
+        free: degrees of freedom before the fit, shape (p,).
     """
     count = len(products)
     size, error = np.full((2, count, 3), np.nan)
@@ -138,18 +152,16 @@ def _fit(products: np.ndarray, order: tuple[int, ...], free: np.ndarray) -> _Fit
         for before, earlier in enumerate(terms):
             share = _quadratic(products, earlier, term) * error[:, before]
             term -= np.where(known[:, before], share, 0.0)[:, None] * earlier
-        square = _quadratic(products, term, term)
-        whole = products[:, column, column]
+        square, whole = _quadratic(products, term, term), products[:, column, column]
         enough = free - known.sum(axis=1) > (_LEAST_FREE if place else 0.0)
-        told = (square > _COLLINEAR * whole) & (whole > 0.0) & enough
-        known[:, place] = told
-        error[told, place] = 1.0 / square[told]
-        size[told, place] = (_quadratic(products, term, residual) * error[:, place])[
-            told
-        ]
-        residual -= np.where(told, size[:, place], 0.0)[:, None] * term
+        clear = (square > _COLLINEAR * whole) & (whole > 0.0) & enough
+        known[:, place] = clear
+        error[clear, place] = 1.0 / square[clear]
+        pull = _quadratic(products, term, residual)
+        size[clear, place] = pull[clear] / square[clear]
+        residual -= np.where(clear, size[:, place], 0.0)[:, None] * term
         terms.append(term)
-    return _Fit(size, error, known, residual)
+    return TermFits(size, error, known, residual)
 
 
 def _quadratic(products: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -169,10 +181,9 @@ def _correlation(follow: np.ndarray, freedom: np.ndarray) -> float:
         follow: sum of the products of neighbouring residuals over their variance.
         freedom: degrees of freedom of each gear.
     """
-    whole = float(freedom.sum())
-    found = min(float(follow.sum()) / max(whole, 1.0), _MOST_CORRELATION)
-    least = max(_LEAST_CORRELATION, _CLEAR / np.sqrt(max(whole, 1.0)))
-    return found if found > least else 0.0
+    whole = max(float(freedom.sum()), 1.0)
+    found = min(float(follow.sum()) / whole, MOST_CORRELATION)
+    return found if found > max(_LEAST_CORRELATION, _CLEAR / np.sqrt(whole)) else 0.0
 
 
 def _swing(sums: MountingSums) -> float:

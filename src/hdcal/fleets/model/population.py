@@ -1,6 +1,6 @@
 """The posterior of a fleet: the population of each quantity, and every gear in it.
 
-The noise comes first. What the residuals of a gear tell of its noise is integrated over
+The noise comes first: what the residuals of a gear tell of its noise is integrated over
 in the other quantities, which tell next to nothing of the noise.
 """
 
@@ -12,20 +12,17 @@ import numpy as np
 import pandas as pd
 
 from hdcal.fleets.model.gear_noise import GearNoise, gear_noise
-from hdcal.fleets.model.gear_quantity import GearQuantity, draw_gears
+from hdcal.fleets.model.gear_quantity import MOST_FALSE, GearQuantity, draw_gears
 from hdcal.fleets.model.groups import group_offsets
-from hdcal.fleets.model.line_fits import line_fits
+from hdcal.fleets.model.line_fits import LineFits, line_fits
 from hdcal.fleets.model.priors import population_priors
 from hdcal.fleets.model.quantities import FleetGroups, Problems, noise_problem
 from hdcal.fleets.model.sampling import Sampling
 from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import Check
-from hdcal.inference.sample import Progress
 from hdcal.report.item import TAILS
 
-# In the order in which they are sampled.
-QUANTITIES = ("noise", "stiffness", "zero", "loop", "bend")
 # Names of sites in the draws; other sites get the name of the quantity before theirs.
 _SITES = {
     "stiffness": {
@@ -39,17 +36,19 @@ _SITES = {
     "loop": {"centre": "loop"},
     "bend": {"centre": "bend"},
 }
+_SHAPES = ("loop", "bend")
 _GROUPS = ("lot_", "rig_", "operator_")
 # Gears that the population is sampled from, at most; of more a random choice of so
 # many, which tell its scatter to 1 %.
 MOST_SAMPLED = 5_000
+# Fewest gears that tell how much their loops or bends differ.
+_FEWEST = 3
 # Draws of the population over which the noise of gears and their probability of being
 # odd is averaged.
 _AVERAGED = 100
 # Draws of the population for which every gear is drawn too: more for few gears, up to
 # a million in all, and at most as many as memory holds.
 _GEAR_DRAWS, _IN_ALL, _MOST_DRAWN = 400, 1_000_000, 20_000_000
-_SETTINGS = ("seed", "chains", "warmup", "draws")
 
 
 @dataclass(frozen=True)
@@ -63,10 +62,8 @@ class FittedFleet:
             bend_N, and off_stiffness, … off_bend, the probability of being odd.
         stiffness: draws of each gear at the sizes of the gear file, shape (t, g)
             [N/mm as read].
-        correlation: of neighbouring residuals, for which intervals are widened.
-        lots: names in the order of lot_1, … of the draws; empty without lots.
-        operators: likewise.
-        rigs: likewise.
+        groups: lots, rigs and operators.
+        fits: curves of each gear alone.
         unit: stiffness at K = 1 [N/mm as read].
         checks: of the samplers.
         settings: of the run.
@@ -75,13 +72,20 @@ class FittedFleet:
     draws: Mapping[str, np.ndarray]
     gears: pd.DataFrame
     stiffness: np.ndarray
-    correlation: float
-    lots: Sequence[str]
-    operators: Sequence[str]
-    rigs: Sequence[str]
+    groups: FleetGroups
+    fits: LineFits
     unit: float
-    checks: tuple[Check, ...]
+    checks: Sequence[Check]
     settings: Mapping[str, Any]
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Words of the checks that failed."""
+        return tuple(c.words for c in self.checks if c.outcome == "failed")
+
+    def flagged(self, quantity: str) -> np.ndarray:
+        """Return which gears are flagged in a quantity, shape (g,)."""
+        return 1.0 - self.gears[f"off_{quantity}"].to_numpy() <= MOST_FALSE
 
 
 class _Populations:
@@ -90,11 +94,12 @@ class _Populations:
     Args:
         sampling: settings of the samplers.
         gears: number of gears.
+        names: quantities in the order in which they are sampled.
     """
 
-    def __init__(self, sampling: Sampling, gears: int):
+    def __init__(self, sampling: Sampling, gears: int, names: Sequence[str]):
         rng = np.random.default_rng(sampling.seed)
-        self._sampling = sampling
+        self._sampling, self._names = sampling, names
         self._chosen = np.sort(rng.permutation(gears)[:MOST_SAMPLED])
         self.draws: dict[str, np.ndarray] = {}
         self.checks: list[Check] = []
@@ -107,14 +112,20 @@ class _Populations:
         many: int = _AVERAGED,
     ) -> dict[str, np.ndarray]:
         """Sample the population of a quantity, and return so many of its draws."""
-        part = replace(self._sampling, progress=_part(self._sampling.progress, name))
-        values, checks = part.run(name, problem.some(self._chosen), start)
+        sampling, whole = self._sampling, self._sampling.progress
+        before, every = self._names.index(name), len(self._names)
+        if whole is not None:
+            sampling = replace(
+                sampling,
+                progress=lambda n, total: whole(before * total + n, every * total),
+            )
+        values, checks = sampling.run(name, problem.some(self._chosen), start)
         self.checks.extend(checks)
         for site, value in values.items():
             plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
             self.draws[_SITES[name].get(site, plain)] = value
-        every = -(-len(next(iter(values.values()))) // many)
-        return {site: value[::every] for site, value in values.items()}
+        step = -(-len(next(iter(values.values()))) // many)
+        return {site: value[::step] for site, value in values.items()}
 
 
 def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
@@ -129,14 +140,17 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
     fits = line_fits(sums, groups.rig, readings.step)
     unit, priors = population_priors(readings.case)
     gears = len(groups.lot)
-    populations = _Populations(sampling, gears)
+    known = {name: fits.gear[np.isfinite(getattr(fits, name))] for name in _SHAPES}
+    shapes = [n for n, of in known.items() if len(np.unique(of)) >= _FEWEST]
+    names = "noise", "stiffness", "zero", *shapes
+    populations = _Populations(sampling, gears, names)
 
     noisy, start = noise_problem(fits, priors)
     noise, noise_sd, odd = gear_noise(noisy, populations.sample("noise", noisy, start))
     table = {"noise_sd_N": noise_sd, "off_noise": odd}
 
-    slots = max(map(int, (np.bincount(fits.gear).max(), np.bincount(sums.gear).max())))
-    problems = Problems(groups, noise, noise_sd, priors, slots)
+    slots = max(np.bincount(fits.gear).max(), np.bincount(sums.gear).max())
+    problems = Problems(groups, noise, noise_sd, priors, int(slots))
     problem, start = problems.stiffness(fits)
     many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
     values = populations.sample("stiffness", problem, start, many)
@@ -144,40 +158,33 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
     table |= columns
 
     zeros, error, shared = _zeros(sums, groups.rig)
-    zeros, widening = readings.side * zeros, fits.widening
-    problem, start = problems.zero(sums, zeros, widening * error, widening * shared)
+    zeros, wider = readings.side * zeros, fits.widening
+    problem, start = problems.zero(sums, zeros, wider * error, wider * shared)
     values = populations.sample("zero", problem, start)
     table["zero_N"] = np.bincount(sums.gear, zeros) / np.bincount(sums.gear)
     table["off_zero"] = _odd(problem, values, seed)
 
     largest_force = abs(readings.largest * float(np.median(fits.slope)))
-    for name in ("loop", "bend"):
+    for name in _SHAPES:
         table |= {f"{name}_N": np.full(gears, np.nan), f"off_{name}": np.zeros(gears)}
-        shape = problems.shape(fits, name, largest_force)
-        if shape is not None:
-            values = populations.sample(name, *shape)
-            table[f"{name}_N"] = _means(getattr(fits, name), fits.gear, gears)
-            table[f"off_{name}"] = _odd(shape[0], values, seed)
+        if name in shapes:
+            problem, start = problems.shape(fits, name, largest_force)
+            values = populations.sample(name, problem, start)
+            each: Any = pd.Series(getattr(fits, name))
+            sizes = each.groupby(fits.gear).mean()
+            table[f"{name}_N"] = sizes.reindex(range(gears)).to_numpy()
+            table[f"off_{name}"] = _odd(problem, values, seed)
+    settings = {n: getattr(sampling, n) for n in ("seed", "chains", "warmup", "draws")}
     return FittedFleet(
         draws=populations.draws,
         gears=pd.DataFrame(table),
         stiffness=stiffness,
-        correlation=fits.correlation,
-        lots=groups.lots,
-        operators=groups.operators,
-        rigs=groups.rigs,
+        groups=groups,
+        fits=fits,
         unit=unit,
         checks=tuple(populations.checks),
-        settings={name: getattr(sampling, name) for name in _SETTINGS},
+        settings=settings,
     )
-
-
-def _part(progress: Progress | None, name: str) -> Progress | None:
-    """Return a progress of one quantity, as a part of that of all quantities."""
-    if progress is None:
-        return None
-    before, every = QUANTITIES.index(name), len(QUANTITIES)
-    return lambda done, total: progress(before * total + done, every * total)
 
 
 def _stiffness(
@@ -188,13 +195,13 @@ def _stiffness(
     apart = np.asarray(drawn.apart)
     lots = np.asarray(group_offsets(values, "lot"))[np.asarray(problem.lot)].T
     stiffness = values["centre"][:, None] * (1.0 + lots) * (1.0 + apart)
-    columns = {"off_stiffness": np.asarray(drawn.off).mean(axis=0)}
-    for name, draws in (("stiffness", stiffness), ("apart", 100.0 * apart)):
-        low, middle, high = np.quantile(draws, TAILS, axis=0)
-        columns |= {name: middle, f"{name}_lo": low, f"{name}_hi": high}
-    columns["apart_percent"] = columns.pop("apart")
-    distance = np.median(apart / values["spread"][:, None], axis=0)
-    return stiffness, columns | {"distance_sd": distance}
+    low, middle, high = np.quantile(stiffness, TAILS, axis=0)
+    columns = {"stiffness": middle, "stiffness_lo": low, "stiffness_hi": high}
+    low, middle, high = np.quantile(100.0 * apart, TAILS, axis=0)
+    columns |= {"apart_percent": middle, "apart_lo": low, "apart_hi": high}
+    columns["distance_sd"] = np.median(apart / values["spread"][:, None], axis=0)
+    columns["off_stiffness"] = np.asarray(drawn.off).mean(axis=0)
+    return stiffness, columns
 
 
 def _zeros(
@@ -205,35 +212,26 @@ def _zeros(
     Mountings of a gear on one rig share the error of the slope. On several rigs it
     counts as that of the mounting, which it is with one mounting on each.
 
-    Args:
-        sums: of each mounting.
-        rig: of each mounting, shape (m,).
-
     Returns:
         Zeros, shape (m,) [N]; variance of their errors over σ², shape (m,); and of the
         errors that the mountings of a gear share, shape (g,).
     """
     rigs = 1 + int(rig.max())
     pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)
-    whole = np.bincount(pair, sums.products[:, 0, 0])
-    moved = whole > 0.0
-    xy = np.bincount(pair, sums.products[:, 0, 3])
-    slope = np.where(moved, xy / np.where(moved, whole, 1.0), 0.0)
+    gear, xx, xy = pairs // rigs, sums.products[:, 0, 0], sums.products[:, 0, 3]
+    on_rig, of_gear = (
+        np.stack([np.bincount(index, each) for each in (xx, xy)])
+        for index in (pair, sums.gear)
+    )
     # A gear that never moved on a rig has its slope from the others.
-    gear = pairs // rigs
-    of_gear = np.bincount(gear, xy) / np.bincount(gear, whole)
-    slope = np.where(moved, slope, of_gear[gear])[pair]
-    whole = np.where(moved, whole, np.bincount(gear, whole)[gear])[pair]
+    xx, xy = np.where(on_rig[0] > 0.0, on_rig, of_gear[:, gear])[:, pair]
     x = sums.mean[:, 0]
-    of_slope = x**2 / whole
     several = np.bincount(gear)[sums.gear] > 1
-    count = np.bincount(sums.gear)
-    shared = np.where(several, 0.0, of_slope)
-    error = 1.0 / sums.rows + np.where(several, of_slope, 0.0)
+    shared = np.bincount(sums.gear, np.where(several, 0.0, x**2 / xx))
     return (
-        sums.mean[:, 3] - slope * x,
-        error,
-        np.bincount(sums.gear, shared) / count,
+        sums.mean[:, 3] - xy / xx * x,
+        1.0 / sums.rows + np.where(several, x**2 / xx, 0.0),
+        shared / np.bincount(sums.gear),
     )
 
 
@@ -242,11 +240,3 @@ def _odd(problem: GearQuantity, values, seed: int) -> np.ndarray:
     known = np.any(np.asarray(problem.present) > 0.0, axis=1)
     odd = np.asarray(draw_gears(problem, values, seed).off).mean(axis=0)
     return np.where(known, odd, 0.0)
-
-
-def _means(values: np.ndarray, gear: np.ndarray, gears: int) -> np.ndarray:
-    """Return the mean of the values of each gear over its rigs; NaN without any."""
-    known = np.isfinite(values)
-    count = np.bincount(gear[known], minlength=gears)
-    whole = np.bincount(gear[known], values[known], gears)
-    return np.where(count > 0, whole / np.maximum(count, 1), np.nan)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -33,24 +34,16 @@ _LEAST = 1e-4
 # Sds from the centre at which few ordinary gears are.
 _FAR = 4.0
 
-# Fewest gears that tell how much gears differ.
-_FEWEST = 3
-
 # A problem with values near its mode, from which a search is short.
 Quantity = tuple[GearQuantity, dict[str, float]]
 
 
 @dataclass(frozen=True)
 class FleetGroups:
-    """Lots, rigs and operators that are distinguished.
+    """Names of lots, rigs and operators, none where they are not distinguished.
 
-    Attributes:
-        lots: names; empty where lots are not distinguished, likewise below.
-        lot: index of the lot of each gear, shape (g,).
-        rigs: names.
-        rig: index of the rig of each mounting, shape (m,).
-        operators: names.
-        operator: index of the operator of each mounting, shape (m,).
+    With the index of the lot of each gear, shape (g,), and of the rig and the operator
+    of each mounting, shape (m,).
     """
 
     lots: list[str]
@@ -62,20 +55,17 @@ class FleetGroups:
 
     @classmethod
     def of(cls, case: Case, run: np.ndarray) -> "FleetGroups":
-        """Return the groups of a case.
-
-        Args:
-            case: with the labels of gears and runs.
-            run: index of the run of each mounting, shape (m,).
-        """
-        lots, lot = distinguished(case.lots)
-        if not lots:
-            lot = np.zeros(len(case.specimen_labels), int)
-        each = []
-        for labels in (case.rigs, case.operators):
+        """Return the groups of a case; run is that of each mounting, shape (m,)."""
+        gear = np.arange(len(case.specimen_labels))
+        each: list[Any] = []
+        for labels, member in (
+            (case.lots, gear),
+            (case.rigs, run),
+            (case.operators, run),
+        ):
             names, index = distinguished(labels)
-            each += [names, index[run] if names else np.zeros(len(run), int)]
-        return cls(lots, lot, *each)
+            each += [names, index[member] if names else np.zeros(len(member), int)]
+        return cls(*each)
 
 
 def noise_problem(
@@ -85,17 +75,16 @@ def noise_problem(
     own = {"centre": priors["sigma"], "spread": NOISE_SPREAD}
     odd = {"off_share": ODD, "off_ratio": ODD_RATIO}
     problem = GearNoise(own | odd, fits.freedom, fits.log_sd)
-    known = fits.freedom > 0.0
-    start = (
-        {"centre": float(np.exp(np.median(fits.log_sd[known])))} if any(known) else {}
-    )
+    known = fits.log_sd[fits.freedom > 0.0]
+    start = {"centre": float(np.exp(np.median(known)))} if len(known) else {}
     return problem, _sampled(start, problem)
 
 
+@dataclass(frozen=True)
 class Problems:
     """Problems of the quantities of one fleet, all of one structure.
 
-    Args:
+    Attributes:
         groups: of gears and mountings.
         noise: of each gear.
         noise_sd: its median, shape (g,) [N].
@@ -103,35 +92,35 @@ class Problems:
         slots: most rows of a gear.
     """
 
-    def __init__(
-        self,
-        groups: FleetGroups,
-        noise: NoiseNodes,
-        noise_sd: np.ndarray,
-        priors: Mapping[str, Prior],
-        slots: int,
-    ):
-        self._groups, self._noise, self._noise_sd = groups, noise, noise_sd
-        self._priors, self._slots = priors, slots
+    groups: FleetGroups
+    noise: NoiseNodes
+    noise_sd: np.ndarray
+    priors: Mapping[str, Prior]
+    slots: int
 
     def stiffness(self, fits: LineFits) -> Quantity:
         """Return the population of the stiffness, which is relative to the centre."""
-        groups, middle = self._groups, float(np.median(fits.slope))
+        groups, middle = self.groups, float(np.median(fits.slope))
         apart = fits.slope / middle - 1.0
-        sd = np.sqrt(fits.slope_error) * self._noise_sd[fits.gear] / middle
+        sd = np.sqrt(fits.slope_error) * self.noise_sd[fits.gear] / middle
         variance = np.maximum(sd, _LEAST) ** 2
         found: dict[str, Grouping] = {}
         if groups.rigs:
             found["rig"] = gains_of_rigs(apart, variance, fits.gear, fits.rig)
             apart = apart - found["rig"].offsets[fits.rig]
-        of_gear = _mean(apart, 1.0 / variance, fits.gear, len(groups.lot))
+        gears = len(groups.lot)
+        whole = np.bincount(fits.gear, 1.0 / variance, gears)
+        of_gear = np.bincount(fits.gear, apart / variance, gears)
+        # A gear without a slope of its own lies in the middle.
+        none = np.full(gears, np.median(apart))
+        of_gear = np.divide(of_gear, whole, out=none, where=whole > 0.0)
         if groups.lots:
             found["lot"] = medians_of_groups(of_gear, groups.lot)
             of_gear = of_gear - found["lot"].offsets[groups.lot]
-        median, log_sd = self._priors["stiffness"].numbers
+        median, log_sd = self.priors["stiffness"].numbers
         own = {
             "_centre": Prior("normal", (float(np.log(median)), float(log_sd))),
-            "spread": self._priors["specimen_sd"],
+            "spread": self.priors["specimen_sd"],
             "off_share": ODD_STIFFNESS,
         }
         columns = {"value": fits.slope, "error": fits.slope_error, "rig": fits.rig}
@@ -155,48 +144,34 @@ class Problems:
             error: variance of their errors over σ², shape (m,).
             shared: variance of an error that all zeros of a gear share, shape (g,).
         """
-        operator = self._groups.operator
+        operator, rest = self.groups.operator, zeros
         found: dict[str, Grouping] = {}
-        rest = zeros
-        if self._groups.operators:
+        if self.groups.operators:
             found["operator"] = medians_of_groups(zeros, operator)
             rest = zeros - found["operator"].offsets[operator]
         own = {
-            "_centre": self._priors["zero"],
-            "spread": self._priors["run_offset_sd"],
+            "_centre": self.priors["zero"],
+            "spread": self.priors["run_offset_sd"],
             "off_share": ODD,
         }
         columns = {"value": zeros, "error": error, "operator": operator}
-        problem = self._problem(
-            own, sums.gear, columns, found, shared=shared, by_row=1.0
-        )
+        how = {"shared": shared, "by_row": 1.0}
+        problem = self._problem(own, sums.gear, columns, found, **how)
         return problem, _sampled(_start(rest, self._usual_noise), problem)
 
-    def shape(self, fits: LineFits, name: str, largest_force: float) -> Quantity | None:
-        """Return the population of the loop or the bend; None where few gears have one.
-
-        Args:
-            fits: of gears on rigs.
-            name: loop or bend.
-            largest_force: size of it [N].
-        """
+    def shape(self, fits: LineFits, name: str, largest_force: float) -> Quantity:
+        """Return the population of the loop or the bend, by its name."""
         value, error = getattr(fits, name), getattr(fits, f"{name}_error")
         known = np.isfinite(value)
-        if len(np.unique(fits.gear[known])) < _FEWEST:
-            return None
         centre, spread = shape_priors(largest_force)
-        own = {
-            "_centre": centre,
-            "spread": spread,
-            "off_share": ODD,
-        }
+        own = {"_centre": centre, "spread": spread, "off_share": ODD}
         columns = {"value": value[known], "error": error[known]}
         problem = self._problem(own, fits.gear[known], columns, {})
         return problem, _sampled(_start(value[known], self._usual_noise), problem)
 
     @property
     def _usual_noise(self) -> float:
-        return float(np.median(self._noise_sd))
+        return float(np.median(self.noise_sd))
 
     def _problem(
         self,
@@ -210,18 +185,17 @@ class Problems:
         by_row: float = 0.0,
     ) -> GearQuantity:
         """Return a problem; columns have a value for each row, gear is their gear."""
-        gears = len(self._groups.lot)
+        gears = len(self.groups.lot)
         order = np.argsort(gear, kind="stable")
         slot = np.empty(len(gear), int)
         slot[order] = np.arange(len(gear)) - np.searchsorted(gear[order], gear[order])
 
-        def dense(name: str, fill: float, kind: type = float) -> np.ndarray:
-            table = np.full((gears, self._slots), fill, kind)
-            if name in columns:
-                table[gear, slot] = columns[name]
+        def dense(name: str, fill: float) -> np.ndarray:
+            table = np.full((gears, self.slots), fill)
+            table[gear, slot] = columns.get(name, fill)
             return table
 
-        present = np.zeros((gears, self._slots))
+        present = np.zeros((gears, self.slots))
         present[gear, slot] = 1.0
         priors = {**priors, "off_ratio": ODD_RATIO}
         priors |= {f"{kind}_ratio": GROUP_RATIO for kind in groups}
@@ -234,22 +208,15 @@ class Problems:
             value=dense("value", 0.0),
             error=dense("error", 1.0),
             present=present,
-            rig=dense("rig", 0, int),
-            operator=dense("operator", 0, int),
+            rig=dense("rig", 0),
+            operator=dense("operator", 0),
             shared=np.zeros(gears) if shared is None else shared,
-            lot=self._groups.lot,
-            noise=self._noise,
+            lot=self.groups.lot,
+            noise=self.noise,
             groups=dict(groups),
             relative=np.asarray(relative),
             by_row=np.asarray(by_row),
         )
-
-
-def _mean(values, weight, index, count: int) -> np.ndarray:
-    whole = np.bincount(index, weight, count)
-    mean = np.bincount(index, weight * values, count) / np.where(whole > 0, whole, 1.0)
-    # A gear without a slope of its own lies in the middle.
-    return np.where(whole > 0.0, mean, np.median(values))
 
 
 def _start(values: np.ndarray, unit: float) -> dict[str, float]:

@@ -36,10 +36,7 @@ class Sampling:
     ) -> tuple[dict[str, np.ndarray], tuple[Check, ...]]:
         """Return draws by site, of all chains, and the checks of the sampler.
 
-        Args:
-            name: of the quantity, for the checks.
-            problem: its population.
-            start: sites whose value is roughly known.
+        The name of the quantity is put before each check; `start` has rough values.
         """
         whitening = laplace.fit(problem, start)
         size = {"chains": self.chains, "draws": self.draws, "progress": self.progress}

@@ -108,7 +108,7 @@ def _column(
     table: ReadTable, header: str, place: int, findings: FileFindings
 ) -> np.ndarray:
     """Return a size of each row [mm], NaN where it is wrong."""
-    cells = table.grid.read([place])[place].astype(object)
+    cells = table.grid.read(place)
     column, bad = read_numbers(cells, has_comma([cells]))
     for index, words, _ in bad:
         findings.add(words, "State the size", int(table.rows[index]), header)

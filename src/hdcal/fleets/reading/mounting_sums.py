@@ -136,7 +136,7 @@ class MountingSums:
             movement (1 loading, −1 unloading), and the force y [N].
         products: sum of (v − mean)(v − mean)ᵀ, shape (m, 4, 4).
         lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over successive readings.
-        reach: largest deformation as read, without its sign, shape (m,) [mm].
+        reach: largest deformation, without its sign, shape (m,) [mm].
     """
 
     gear: np.ndarray
@@ -160,4 +160,5 @@ class MountingSums:
             mean=scale * self.mean,
             products=_outer(scale, scale) * self.products,
             lagged=_outer(scale, scale) * self.lagged,
+            reach=np.abs(factor) * self.reach,
         )

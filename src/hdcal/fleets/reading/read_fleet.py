@@ -37,7 +37,6 @@ def read_fleet(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
-    reading: str | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     specimen: str | None = None,
@@ -53,7 +52,6 @@ def read_fleet(
         gear: as in `read_case`, as are all that follow; a case has its own.
         columns: quantity -> header.
         theory: overrides that of the gear file.
-        reading: of the deformation.
         encoding: of text files.
         sheet: of a workbook.
         specimen: label of the only one that is read.
@@ -64,10 +62,7 @@ def read_fleet(
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    if isinstance(data, FleetReadings):
-        return data
-    how: dict = {"columns": columns, "theory": theory, "reading": reading}
-    how |= {"range": range}
+    how: dict = {"columns": columns, "theory": theory, "range": range}
     if is_parquet(data):
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
         return _with_faults(found, sums.left_out, sums.observed)

@@ -10,7 +10,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
 from hdcal.data.scatter import reading_step
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.errors import Finding
 from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums, reading_vectors
 from hdcal.inference import distributions
 
@@ -30,7 +30,6 @@ class FleetReadings:
             the sizes of the gear file.
         sizes: sizes of each gear by column, if it has its own gear file.
         faults: gears with a fault, each with what it is; some are among the readings.
-        checked: whether no gear with a fault is left.
     """
 
     case: Case
@@ -39,14 +38,15 @@ class FleetReadings:
     size_ratio: np.ndarray | None = None
     sizes: Mapping[str, Sequence] | None = None
     faults: Mapping[str, Finding] = field(default_factory=dict)
-    checked: bool = False
 
     @property
     def largest(self) -> float:
         """Largest deformation as read, with its sign [mm]."""
-        farthest = int(np.argmax(self.sums.reach))
+        ratio = 1.0 if self.size_ratio is None else self.size_ratio[self.sums.gear]
+        reach = self.sums.reach / ratio
+        farthest = int(np.argmax(reach))
         sign = self.side * np.sign(self.sums.mean[farthest, 0])
-        return float(np.copysign(self.sums.reach[farthest], sign))
+        return float(np.copysign(reach[farthest], sign))
 
     @property
     def step(self) -> float:
@@ -63,74 +63,33 @@ class FleetReadings:
         sums = self.sums.stretched(ratio[self.sums.gear])
         return replace(self, sums=sums, size_ratio=ratio)
 
-    def since(self, day: str) -> "FleetReadings":
-        """Return what was read on a day or later, of mountings with a date.
-
-        Args:
-            day: as 2026-09-01.
-
-        Raises:
-            InputError: it is no day, the data have no dates, or nothing was read then.
-        """
-        kept = _read_since(self.case, day)[self.sums.run]
-        if not kept.any():
-            words = f"nothing was read on {quoted(day)} or later"
-            words = words if self.case.dates else "the data have no dates"
-            raise InputError([Finding("since", words, "See the dates of the data")])
-        found = self._where(kept)
-        notes = (*self.case.notes, f"What was read before {day} is left out.")
-        return replace(found, case=replace(found.case, notes=notes))
-
     def without(self, bad: Mapping[str, Finding]) -> "FleetReadings":
-        """Return the readings of other gears.
-
-        Args:
-            bad: gears that are left out, each with its fault.
-        """
-        gone = among(self.case.specimen_labels, bad)
-        found = self._where(~gone[self.sums.gear]) if gone.any() else self
-        left_out = {**self.case.left_out, **bad}
-        return replace(found, case=replace(found.case, left_out=left_out))
-
-    def _where(self, kept: np.ndarray) -> "FleetReadings":
-        """Return the readings of some mountings, a mask of shape (m,)."""
-        case, sums = self.case, self.sums.where(kept)
+        """Return the readings of other gears than the bad ones, which are left out."""
+        case, sums = self.case, self.sums
+        left_out = {**case.left_out, **bad}
+        gone = among(case.specimen_labels, bad)
+        if not gone.any():
+            return replace(self, case=replace(case, left_out=left_out))
+        sums = sums.where(~gone[sums.gear])
         gears, gear = np.unique(sums.gear, return_inverse=True)
         runs, run = np.unique(sums.run, return_inverse=True)
-        records = case.records
-        rows = np.isin(records.run, runs) & np.isin(records.specimen, gears)
-        records = jax.tree.map(lambda column: np.asarray(column)[rows], records)
+        rows = np.isin(case.records.run, runs) & np.isin(case.records.specimen, gears)
+        records = jax.tree.map(lambda column: np.asarray(column)[rows], case.records)
         records = replace(
             records,
             specimen=np.searchsorted(gears, records.specimen),
             run=np.searchsorted(runs, records.run),
         )
-        case = replace(
-            case,
-            records=records,
-            specimen_labels=_some(case.specimen_labels, gears),
-            run_labels=_some(case.run_labels, runs),
-            lots=_some(case.lots, gears),
-            operators=_some(case.operators, runs),
-            rigs=_some(case.rigs, runs),
-            dates=_some(case.dates, runs),
-        )
+        of_gears = {n: _some(getattr(case, n), gears) for n in _OF_GEARS}
+        of_runs = {n: _some(getattr(case, n), runs) for n in _OF_RUNS}
+        case = replace(case, records=records, left_out=left_out, **of_gears, **of_runs)
         ratio = None if self.size_ratio is None else self.size_ratio[gears]
         sums = replace(sums, gear=gear, run=run)
         return replace(self, case=case, sums=sums, size_ratio=ratio)
 
 
-def _read_since(case: Case, day: str) -> np.ndarray:
-    """Return which runs were read on a day or later, shape (r,)."""
-    try:
-        first = np.datetime64(day, "D")
-    except (ValueError, TypeError):
-        words, remedy = f"{quoted(day)} is no day", "Write it as 2026-09-01"
-        raise InputError([Finding("since", words, remedy)]) from None
-    if not case.dates:
-        return np.zeros(len(case.run_labels), bool)
-    dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")
-    return dates >= first
+_OF_GEARS = "specimen_labels", "lots"
+_OF_RUNS = "run_labels", "operators", "rigs", "dates"
 
 
 def _some(labels: tuple[str, ...], places: np.ndarray) -> tuple[str, ...]:
@@ -145,8 +104,7 @@ def fleet_readings(case: Case) -> FleetReadings:
     read, force = np.asarray(records.deformation), np.asarray(records.force)
     x = read * modulus_left(case.gear, np.asarray(records.temperature))
     v = reading_vectors(x, np.asarray(records.sense), force)
-    sums = RowSums.of(index.ravel(), v, read)
-    return readings_of(case, gear, run, sums)
+    return readings_of(case, gear, run, RowSums.of(index.ravel(), v, read))
 
 
 def readings_of(

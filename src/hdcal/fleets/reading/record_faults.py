@@ -14,6 +14,7 @@ from scipy.stats import norm, t
 
 from hdcal.errors import Finding
 from hdcal.fleets.model.groups import robust_sd
+from hdcal.fleets.model.line_fits import MOST_CORRELATION, fit_terms, widening
 from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.screening.result import MACHINE_CLASS
@@ -30,8 +31,6 @@ _FLAT = 1e-9
 # The residuals of a record without a curve: in those of the usual gear, as a share of
 # the range of its force, and the correlation of neighbours in its standard error.
 _TIMES, _SHARE, _ALIKE = 5.0, 0.01, 3.0
-# Correlation of neighbours that is taken into account at most, and sweeps of a polish.
-_MOST_ALIKE, _SWEEPS = 0.99, 5
 # Probability that one of all gears without a fault is taken for two parts, degrees of
 # freedom of the tails of their scatter, and a difference that the rig may make.
 _TWO_PARTS, _TAILS, _SAME = 1e-3, 8.0, 2.0 * MACHINE_CLASS
@@ -60,23 +59,14 @@ class CurveFits(NamedTuple):
 
 def curve_fits(sums: MountingSums | RowSums) -> CurveFits:
     """Fit line, loop and bend to each set of rows."""
-    size = np.sqrt(np.einsum("pii->pi", sums.products))
-    size = np.where(size > 0.0, size, 1.0)
-    scaled = sums.products / (size[:, :, None] * size[:, None, :])
-    inverse = np.linalg.pinv(scaled[:, :3, :3], rcond=1e-6, hermitian=True)
-    weight = (inverse @ scaled[:, :3, 3:])[..., 0]
-    weight = -weight * size[:, 3:] / size[:, :3]
-    residual = np.append(weight, np.ones((len(size), 1)), axis=1)
-    rank = np.linalg.matrix_rank(scaled[:, :3, :3], tol=1e-6, hermitian=True)
-    free = sums.rows - 1.0 - rank
-    square, follow = (
-        np.einsum("pi,pij,pj->p", residual, each, residual)
-        for each in (sums.products, sums.lagged)
-    )
+    fits = fit_terms(sums.products, (0, 1, 2), sums.rows - 1.0)
+    free = sums.rows - 1.0 - fits.known.sum(axis=1)
+    square = fits.squares(sums.products)
     exact = square <= _ROUNDING * sums.products[:, 3, 3]
     square = np.where(exact, 1.0, square)
     sd = np.where(exact, 0.0, np.sqrt(square / np.maximum(free, 1.0)))
-    return CurveFits(residual, free, sd, np.where(exact, 0.0, follow / square))
+    alike = np.where(exact, 0.0, fits.squares(sums.lagged) / square)
+    return CurveFits(fits.residual, free, sd, alike)
 
 
 def irregular(
@@ -111,11 +101,11 @@ def irregular(
 def faults_among_gears(readings: FleetReadings) -> dict[str, Finding]:
     """Return gears whose record differs from those of all others, each with its fault.
 
-    Args:
-        readings: at one size.
+    The readings are those at one size.
     """
     case, sums = readings.case, readings.sums
     bad: dict[int, Finding] = {}
+    # Each test is of the gears that passed those before it.
     for test, remedy in _TESTS.items():
         if not len(sums.gear):
             break
@@ -129,9 +119,9 @@ def _still(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
     """Yield gears that never moved in a run, which has its zero."""
     moved = np.bincount(sums.gear, sums.products[:, 0, 0])
     place = np.bincount(sums.gear, sums.rows * sums.mean[:, 0] ** 2)
-    name = readings.case.units.displacement
-    rows = np.bincount(sums.gear, sums.rows)
-    for gear in np.flatnonzero((moved <= _ROUNDING * place) & (rows > 0.0)):
+    still = moved <= _ROUNDING * place
+    for gear in np.flatnonzero(still & (np.bincount(sums.gear) > 0)):
+        name = readings.case.units.displacement
         yield gear, f"it was read at one {name} only in each of its runs"
 
 
@@ -185,26 +175,28 @@ def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
         return
     table: Any = _log_stiffness(sums)
     if readings.case.rigs:
-        table["place"] -= _gains(table, np.array(readings.case.rigs)[sums.run])
-    ends = table.sort_values("place").groupby("gear")
-    low, high, many = ends.first(), ends.last(), ends.size().to_numpy()
+        off = table["place"] - table.groupby("gear")["place"].transform("median")
+        rig = np.array(readings.case.rigs)[sums.run]
+        table["place"] -= off.groupby(rig).transform("median")
+    gears = table.sort_values("place").groupby("gear")
+    low, high, many = gears.first(), gears.last(), gears.size()
+    count = table.groupby("gear")["place"].transform("size")
     off = table["place"] - table.groupby("gear")["place"].transform("mean")
-    count = np.bincount(sums.gear)[sums.gear]
-    scale = np.sqrt(count / np.maximum(count - 1.0, 1.0))
-    own = robust_sd((off * scale)[count > 1]) ** 2 - float(table["variance"].median())
+    off = (off * np.sqrt(count / (count - 1.0)))[count > 1]
+    own = robust_sd(off.to_numpy()) ** 2 - float(table["variance"].median())
     variance = low["variance"] + high["variance"] + 2.0 * max(own, 0.0)
-    gap, scatter = (high["place"] - low["place"]).to_numpy(), np.sqrt(variance)
-    chances = max(float(np.sum(many * (many - 1.0))), 1.0)
-    freedom = min((float(np.sum(many - 1.0)) + 1.0) / 2.0, _TAILS)
+    gap, scatter = high["place"] - low["place"], np.sqrt(variance)
+    chances = max(float((many * (many - 1.0)).sum()), 1.0)
+    freedom = min((float((many - 1.0).sum()) + 1.0) / 2.0, _TAILS)
     limit = np.maximum(t.isf(_TWO_PARTS / chances, freedom) * scatter, _SAME)
-    labels, usual = readings.case.run_labels, 100.0 * float(np.median(scatter))
-    for place in np.flatnonzero(gap > limit):
-        softer, stiffer = (labels[each["run"].iloc[place]] for each in (low, high))
-        more = 100.0 * np.expm1(gap[place])
+    labels, usual = readings.case.run_labels, 100.0 * float(scatter.median())
+    for gear in gap.index[gap > limit]:
+        softer, stiffer = (labels[each["run"][gear]] for each in (low, high))
         yield (
-            low.index[place],
-            f"mounting {stiffer} is {more:.2g} % stiffer than {softer}, and mountings "
-            f"of other gears differ by {usual:.2g} % (sd): two parts under one label",
+            gear,
+            f"mounting {stiffer} is {100.0 * np.expm1(gap[gear]):.2g} % stiffer than "
+            f"{softer}, and mountings of other gears differ by {usual:.2g} % (sd): two "
+            "parts under one label",
         )
 
 
@@ -217,23 +209,12 @@ def _log_stiffness(sums: MountingSums) -> pd.DataFrame:
     loop, bend = np.median(fits.residual[:, 1:3], axis=0)
     pull = sums.products[:, 0] @ np.array([0.0, loop, bend, 1.0])
     pull = np.maximum(pull, np.finfo(float).tiny)
-    alike = np.clip(np.median(fits.alike), 0.0, _MOST_ALIKE)
-    noise = np.maximum(fits.sd, np.median(fits.sd)) ** 2 * (1 + alike) / (1 - alike)
+    alike = np.clip(np.median(fits.alike), 0.0, MOST_CORRELATION)
+    noise = np.maximum(fits.sd, np.median(fits.sd)) ** 2 * widening(alike)
     columns = {"place": np.log(pull / square), "variance": noise * square / pull**2}
     return pd.DataFrame({"gear": sums.gear, "run": sums.run} | columns)
 
 
-def _gains(table: pd.DataFrame, rig: np.ndarray) -> np.ndarray:
-    """Return the logarithm of the gain of each mounting's rig, by median polish."""
-    gain = np.zeros(len(table))
-    for _ in range(_SWEEPS):
-        off = table["place"] - gain
-        off -= off.groupby(table["gear"]).transform("median")
-        gain += off.groupby(rig).transform("median").to_numpy()
-    return gain
-
-
-# Each test is of the gears that passed those before it.
 _TESTS = {
     _still: "Read it at two or more in one run, or leave it out",
     _other_unit: "Check the units of its record, and whether it is of this kind",

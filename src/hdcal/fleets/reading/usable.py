@@ -34,8 +34,6 @@ def usable(
         InputError: a gear has a fault and may not be left out, fewer than three are
             left, none scatters about its line, or the table cannot be read.
     """
-    if readings.checked and gears is None:
-        return readings
     bad = dict(readings.faults)
     many = len({*readings.case.specimen_labels, *bad})
     readings = replace(readings.without(bad), faults={})
@@ -52,14 +50,27 @@ def usable(
         bad |= unlike
         readings = readings.without(unlike)
         left = len(readings.case.specimen_labels)
-        if bad and not skip_bad:
+        if bad and (left < FEWEST or not skip_bad):
             wrong += _of_gears(bad)
         if left < FEWEST:
-            wrong += _too_few(left, bad if skip_bad else {}, readings.case.name)
+            words = f"{left} gear{'' if left == 1 else 's'}: how much gears differ "
+            words += f"takes {FEWEST} or more"
+            remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
+            if bad:
+                words = f"of {left + len(bad)} gears {left} can be used. {words}"
+                remedy = "Correct what is wrong with the others"
+            wrong.append(Finding(readings.case.name, words, remedy))
         elif bad and not skip_bad:
             wrong.append(offer(bad, many))
     require_scatter(readings.case)
-    return replace(_at_own_scale(readings), sizes=None, checked=True)
+    case, records = readings.case, readings.case.records
+    # Of very many gears only the first rows are there, or none that are left.
+    if len(records.force):
+        # Shipped priors are shares of the largest readings that are left.
+        force, read = np.asarray(records.force), np.asarray(records.deformation)
+        gear = at_full_scale(case.gear, scale_of(force, read, case.gear.reading))
+        case = replace(case, gear=gear)
+    return replace(readings, case=case, sizes=None)
 
 
 def _of_gears(bad: Mapping[str, Finding]) -> list[Finding]:
@@ -72,24 +83,3 @@ def _of_gears(bad: Mapping[str, Finding]) -> list[Finding]:
         words = f"and {more} more gear{' has' if more == 1 else 's have'} a fault"
         each[LISTED:] = [Finding(each[0].file, words, "Correct these too")]
     return each
-
-
-def _too_few(left: int, bad: Mapping[str, Finding], name: str) -> list[Finding]:
-    words = f"{left} gear{'' if left == 1 else 's'}: how much gears differ takes "
-    words += f"{FEWEST} or more"
-    remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-    if bad:
-        words = f"of {left + len(bad)} gears {left} can be used. {words}"
-        remedy = "Correct what is wrong with the others"
-    return [*_of_gears(bad), Finding(name, words, remedy)]
-
-
-def _at_own_scale(readings: FleetReadings) -> FleetReadings:
-    """Return readings whose shipped priors are shares of the largest that are left."""
-    case, records = readings.case, readings.case.records
-    # Of very many gears only the first rows are there.
-    if not len(records.force):
-        return readings
-    force, read = np.asarray(records.force), np.asarray(records.deformation)
-    gear = at_full_scale(case.gear, scale_of(force, read, case.gear.reading))
-    return replace(readings, case=replace(case, gear=gear))

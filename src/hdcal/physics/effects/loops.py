@@ -8,12 +8,7 @@ from hdcal.physics.history import by_label, play, stop_cells
 from hdcal.physics.theory import Scalar
 
 
-class PlasticYield(
-    Effect,
-    stage="force",
-    family="loop",
-    needs=("unloading",),
-):
+class PlasticYield(Effect, stage="force", family="loop", needs=("unloading",)):
     """F → F − s k ω_p, ω_p the play of ω with half-width ω_y (Prandtl's element).
 
     Beyond the yield deformation ω_y the stiffness is (1 − s) k, on unloading it is k
@@ -41,11 +36,7 @@ class PlasticYield(
 
 
 class CoulombFriction(
-    Effect,
-    stage="force",
-    family="loop",
-    needs=("unloading",),
-    instantaneous=True,
+    Effect, stage="force", family="loop", needs=("unloading",), instantaneous=True
 ):
     """F → F + F_c s, with s the sign of the last movement; a hold keeps it.
 
@@ -63,11 +54,7 @@ class CoulombFriction(
 
 
 class LoadFriction(
-    Effect,
-    stage="force",
-    family="loop",
-    needs=("unloading",),
-    instantaneous=True,
+    Effect, stage="force", family="loop", needs=("unloading",), instantaneous=True
 ):
     """F → F + μ |k ω| s, with s the sign of the last movement; a hold keeps it.
 

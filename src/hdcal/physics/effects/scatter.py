@@ -53,11 +53,7 @@ class Scatter(Effect):
 
 
 class RunOffset(
-    Scatter,
-    stage="sensor",
-    family="mounting or gear",
-    needs=("runs",),
-    members="run",
+    Scatter, stage="sensor", family="mounting or gear", needs=("runs",), members="run"
 ):
     """F → F + b_i in run i, with b_i ~ N(0, sd²).
 

@@ -7,11 +7,7 @@ from hdcal.physics.theory import Scalar
 
 
 class RigCompliance(
-    Effect,
-    stage="deformation",
-    family="rig",
-    needs=("bare_rig",),
-    instantaneous=True,
+    Effect, stage="deformation", family="rig", needs=("bare_rig",), instantaneous=True
 ):
     """ω → ω/(1 + c k): springs in series, 1/k_read = 1/k + c.
 

@@ -5,10 +5,7 @@ from hdcal.physics.theory import Scalar
 
 
 class ThermalExpansion(
-    Effect,
-    stage="deformation",
-    family="zero over temperature",
-    needs=("temperature",),
+    Effect, stage="deformation", family="zero over temperature", needs=("temperature",)
 ):
     """ω → ω + a (T − T_ref), radial.
 
@@ -50,10 +47,7 @@ class ThermalStiffness(
 
 
 class ThermalZeroDrift(
-    Effect,
-    stage="sensor",
-    family="zero over temperature",
-    needs=("temperature",),
+    Effect, stage="sensor", family="zero over temperature", needs=("temperature",)
 ):
     """F → F + z (T − T_ref).
 

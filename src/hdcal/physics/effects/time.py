@@ -6,11 +6,7 @@ from hdcal.physics.theory import Scalar
 
 
 class ViscousDamping(
-    Effect,
-    stage="force",
-    family="rate or time",
-    needs=("rates",),
-    instantaneous=True,
+    Effect, stage="force", family="rate or time", needs=("rates",), instantaneous=True
 ):
     """F → F + c dω/dt, with the rate as read.
 

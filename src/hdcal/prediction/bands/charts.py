@@ -33,16 +33,10 @@ _UNTESTED = "not tested: extrapolated"
 
 @dataclass(frozen=True)
 class Branch:
-    """The curves of one temperature and direction.
+    """The curves of one temperature [°C] and direction.
 
-    Attributes:
-        temperature: of the specimen [°C].
-        rows: of the bands, in the order of the deformation.
-        colour: that of the temperature.
-        loading: whether the movement loads the specimen.
-        label: of the median, empty where another branch has the label.
-        first: whether the legend shows the bands of this branch.
-        opacity: that of the bands, less where many lie upon each other.
+    The median has the label, where no other branch has it; the legend shows the bands
+    of the first branch. Bands are the fainter the more of them lie upon each other.
     """
 
     temperature: float

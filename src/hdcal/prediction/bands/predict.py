@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
@@ -27,18 +26,17 @@ from hdcal.prediction.conditions import (
     is_tested,
     temperature_findings,
     usual_temperature,
+    widest,
 )
+from hdcal.prediction.joint import JointModel, joint
 from hdcal.prediction.members import over_draws
 from hdcal.prediction.models import (
-    Model,
     Models,
     averaging_words,
     left_out_of,
-    models_of,
     probabilities,
 )
-from hdcal.prediction.population import widest
-from hdcal.prediction.simulate import simulate_all
+from hdcal.prediction.simulate import simulate
 
 # Rows predicted at a time: with 4000 draws each array of a block takes 32 MB.
 _BLOCK = 1000
@@ -79,14 +77,14 @@ def predict(
         NotUsable: the posterior failed its checks.
         InputError: empty or non-finite input.
     """
-    found = models_of(models, allow_failed=allow_failed)
-    case = found[0].posterior.case
+    model = joint(models, allow_failed=allow_failed)
+    case = model.posterior.case
     warm = usual_temperature(case) if temperature is None else temperature
     along = _numbers("deformation", deformation)
     levels = _numbers("temperature", warm)
     with Findings() as wrong:
         wrong += _deformation_findings(case, along, direction)
-        wrong += _temperature_findings(found[0], levels)
+        wrong += temperature_findings(case.gear, model.draws, levels)
         wrong += implausible("interval", interval) + implausible("seed", seed)
         if direction not in (None, *DIRECTIONS):
             words = f"'{direction}' is unknown"
@@ -98,18 +96,16 @@ def predict(
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        place = Conditions.of(
-            at[rows], warm[rows], loading[rows], (sense != loading)[rows]
-        )
-        blocks.append(_quantiles(found, place, tails, seed))
+        place = at[rows], warm[rows], loading[rows], (sense != loading)[rows]
+        blocks.append(_quantiles(model, Conditions.of(*place), tails, seed))
     mean, physics, new, straight = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )
-    leftover = any(model.problem.discrepancy is not None for model in found)
-    usable = all(model.posterior.usable for model in found)
-    with_gap = mean if leftover else np.full_like(mean, np.nan)
+    fitted = model.problem.discrepancy is not None
+    with_gap = mean if fitted else np.full_like(mean, np.nan)
     columns = np.concatenate([physics, with_gap, new])
     bands = [name for name in COLUMNS if name.endswith("_N")]
+    usable = all(part.posterior.usable for part in model.models)
     return Bands(
         **dict(zip(bands, columns, strict=True)),
         deformation_mm=at,
@@ -119,7 +115,7 @@ def predict(
         usable=np.full(len(at), usable),
         straight_N=straight,
         interval=interval,
-        causes=probabilities(found),
+        causes=probabilities(model.models),
         weight_left_out=left_out_of(models),
         averaging=tuple(averaging_words(models)),
         tested_range=_range_words(case),
@@ -129,34 +125,32 @@ def predict(
     )
 
 
-def _quantiles(models: Sequence[Model], at: Conditions, tails, seed: int):
+def _quantiles(model: JointModel, at: Conditions, tails, seed: int):
     """Return quantiles [N] as arrays (tail, row).
 
     Of the mean, of the mean without a fitted leftover discrepancy, of a new reading,
     (3, row) each; and the median of the model alone, (row,).
     """
-    problem = models[0].problem
     # The mean is that of the tested gears and mountings, a new reading of a new one.
-    tested = members = simulate_all(models, at, seed=seed)
-    if widest(problem) != "readings":
-        members = simulate_all(models, at, widest(problem), seed=seed)
-    # Independent of the scores of the draws, which have the same seed.
-    rng, count = np.random.default_rng((seed, 1)), len(members.weight)
-    even = (np.arange(count) + 0.5) / count
-    levels, scores, rounding = (rng.permutation(even) for _ in range(3))
-    new = members.sample(levels, ndtri(scores))
-    new += float(problem.step) * (rounding - 0.5)[:, None]
+    tested = members = simulate(model, at, seed=seed)
+    if (population := widest(model.problem)) != "readings":
+        members = simulate(model, at, population, seed=seed)
+    # One new reading of each draw, the same at every row so that the curves are smooth;
+    # independent of the scores of the draws, which have the same seed.
+    rng = np.random.default_rng((seed, 1))
+    even = (np.arange(model.size) + 0.5) / model.size
+    rounding, level = rng.permutation(even), rng.permutation(even)
+    new = members.quantile(level)
+    new = new + float(model.problem.step) * (rounding - 0.5)[:, None]
     mean = tested.centre
     physics = mean - tested.common["leftover"]
     straight = physics - tested.common["bend"]
-
-    def quantiles(values, shares):
-        return over_draws(at.loading * values, members.weight, shares)
-
-    fitted = any(model.problem.discrepancy is not None for model in models)
-    found = quantiles(mean, tails)
-    without = quantiles(physics, tails) if fitted else found
-    return found, without, quantiles(new, tails), quantiles(straight, [0.5])[0]
+    return (
+        over_draws(at.loading * mean, tails),
+        over_draws(at.loading * physics, tails),
+        over_draws(at.loading * new, tails),
+        over_draws(at.loading * straight, 0.5),
+    )
 
 
 def _numbers(name: str, given: Any) -> np.ndarray:
@@ -164,11 +158,11 @@ def _numbers(name: str, given: Any) -> np.ndarray:
     try:
         found = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
-        found = np.zeros((0, 0))
-    if found.ndim == 1:
-        return found
-    remedy = "Give numbers one by one, as in [0.2, 0.4], or a column of a table"
-    raise InputError([Finding(name, "is no list of numbers", remedy)])
+        raise InputError([Finding(name, "is no list of numbers", "")]) from None
+    if found.ndim != 1 or found.size == 0:
+        words = "is empty" if found.size == 0 else "is no list of numbers"
+        raise InputError([Finding(name, words, "Give one or more numbers")])
+    return found
 
 
 def _loading(at: np.ndarray, records: Records) -> np.ndarray:
@@ -182,23 +176,14 @@ def _deformation_findings(
     case: Case, deformation: np.ndarray, direction: str | None
 ) -> list[Finding]:
     """Return what is wrong with deformations [mm], such as another unit."""
-    name, unit = "deformation", case.units.displacement_unit
     tested = float(np.max(np.abs(case.records.deformation)))
-    if deformation.size == 0:
-        return [Finding(name, "is empty", f"give numbers in {unit}")]
-    if wrong := implausible(name, deformation, case.units.displacement):
+    if wrong := implausible("deformation", deformation, case.units.displacement):
         return wrong
     worst = float(deformation[np.argmax(np.abs(deformation))])
-    wrong = far_findings(worst, tested, case.gear.reach, unit)
+    wrong = far_findings(worst, tested, case.gear.reach, case.units.displacement_unit)
     sense = SENSE.get(direction or "", _loading(deformation, case.records))
     each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
     return wrong + next(filter(None, each), [])
-
-
-def _temperature_findings(model: Model, temperature: np.ndarray) -> list[Finding]:
-    if temperature.size == 0:
-        return [Finding("temperature", "is empty", "give numbers in °C")]
-    return temperature_findings(model.posterior.case.gear, model.draws, temperature)
 
 
 def _range_words(case: Case) -> str:
@@ -223,7 +208,7 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
         models: a posterior, or several with probabilities, over which bands average.
         interval: probability inside the bands.
     """
-    case = models_of(models, allow_failed=True)[0].posterior.case
+    case = joint(models, allow_failed=True).posterior.case
     grid, levels = _default_grid(case), _default_temperatures(case.records)
     parts = [
         predict(models, grid, levels, side, interval=interval, allow_failed=True)

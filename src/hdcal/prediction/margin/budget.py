@@ -6,14 +6,13 @@ what a regression on it explains of what the inputs before it left. Nothing is
 linearised but the sensitivity that is printed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
+from hdcal.prediction.joint import JointModel
 from hdcal.prediction.members import Members
-from hdcal.prediction.models import Model
-from hdcal.quantities import Quantities
 from hdcal.report.item import Item, Probability, Words, quantity
 
 # A correlation of this many standard errors, or less, may be chance in the draws: over
@@ -101,60 +100,53 @@ def divided(
 
 
 def budget(
-    models: Sequence[Model],
-    parts: Sequence[Members],
-    rounding_sd: float,
-    direction: int,
-    units: Quantities,
+    model: JointModel, members: Members, rounding_sd: float, direction: int
 ) -> tuple[tuple[BudgetRow, ...], float, float]:
     """Return the rows of the budget, the estimate and its standard uncertainty [N].
 
     Args:
-        models: with their probabilities.
-        parts: the members of each model at one condition.
+        model: of the members.
+        members: at one condition.
         rounding_sd: sd of the rounding of a reading [N].
         direction: of loading; the estimate has the sign of the force.
-        units: of what was measured.
     """
-    chance = np.array([model.probability for model in models])
-    means = np.array([float(part.centre.mean()) for part in parts])
-    estimate = float(chance @ means)
-    between = float(chance @ (means - estimate) ** 2)
-    found = {
-        "cause": np.full(3, between),
-        "rounding": np.full(3, rounding_sd**2),
-    }
-    for share, part in zip(chance, parts, strict=True):
-        common = {name: values[:, 0] for name, values in part.common.items()}
-        rows = divided(part.centre[:, 0], common, "calibration")
-        for name, values in part.scatter.items():
-            within = np.full(3, float(np.mean(values)))
-            rows[name] = tuple(within + rows.get(name, np.zeros(3)))
+    centre = members.centre[:, 0]
+    estimate = float(centre.mean())
+    found = {"cause": np.zeros(3), "rounding": np.full(3, rounding_sd**2)}
+    # Within each model, and between them: one cause has no share in another's inputs.
+    for number in range(len(model.models)):
+        mine = model.number == number
+        common = {name: values[mine, 0] for name, values in members.common.items()}
+        rows: dict = divided(centre[mine], common, "calibration")
+        for name, values in members.scatter.items():
+            within = np.full(3, float(np.mean(values[mine])))
+            rows[name] = within + rows.get(name, np.zeros(3))
+        rows["cause"] = (float(np.mean(centre[mine]) - estimate) ** 2,) * 3
         for name, row in rows.items():
-            found[name] = found.get(name, np.zeros(3)) + share * np.array(row)
+            more = np.mean(mine) * np.array(row)
+            found[name] = found.get(name, np.zeros(3)) + more
     total = float(sum(row[2] for row in found.values()))
     rest = found.pop("calibration")
     for name in [n for n, row in found.items() if row[2] <= _LEAST_SHARE * total]:
         rest = rest + found.pop(name)[2]
     found["calibration"] = rest
-    listed = [
-        _row(n, row, total, models[0], direction, units) for n, row in found.items()
-    ]
+    listed = [_row(n, row, total, model, direction) for n, row in found.items()]
     ranked = sorted(listed, key=lambda row: -row.share)
     return tuple(ranked), direction * estimate, total**0.5
 
 
-def _row(name: str, row, total: float, main: Model, direction: int, units) -> BudgetRow:
+def _row(name: str, row, total: float, model: JointModel, direction: int) -> BudgetRow:
     own, tied, variance = map(float, row)
     label, unit, distribution, site = _INPUTS[name]
     contribution = variance**0.5
     in_newtons = unit == "N" and name != "force_offset"
     # So that standard uncertainty times sensitivity is the contribution.
     slope = np.sign(direction * tied) * (variance / own) ** 0.5
-    sites = [site] if site else []
+    sites, units = [site] if site else [], model.posterior.case.units
     if name == "noise":
-        sites += [n for n in main.draws if n.partition(".")[0] in main.noise_effects]
-    by_data = site in _TYPE_A or any(main.driver(each) == "data" for each in sites)
+        noises = {effect.name for effect in model.effects if effect.stage == "noise"}
+        sites += [n for n in model.draws if n.partition(".")[0] in noises]
+    by_data = site in _TYPE_A or any(model.driver(each) == "data" for each in sites)
     return BudgetRow(
         component=label.format(load=units.load),
         type_="A" if by_data else "B",

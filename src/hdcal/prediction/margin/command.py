@@ -12,70 +12,67 @@ from hdcal.errors import Finding
 
 
 @command(
-    short_help="Force needed at a deformation, and the margin to it.",
+    short_help="Bound the force at a deformation.",
     context_settings={"show_default": True},
 )
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--deformation", type=LENGTH, required=True, help="Deformation as read [mm]."
+    "--deformation",
+    type=LENGTH,
+    required=True,
+    help="Set the deformation as read [mm].",
 )
 @click.option(
     "--limit-force",
     type=FORCE,
-    help="Capacity of the actuator [N]: its size, in compression and in tension.",
+    help="Compare with this capacity of the actuator [N], by its magnitude.",
 )
 @click.option(
     "--rule",
     type=click.Choice(["guarded", "simple"]),
-    help="Decision about it, by the expanded uncertainty or not [default: guarded].",
+    help="Decide with a guard band or without [default: guarded].",
 )
 @click.option(
     "--given-force",
     type=FORCE,
-    help="Force with its sign [N] whose deformation is asked for.",
+    help="Bound the deformation at this force [N].",
 )
 @click.option(
     "--temperature",
     type=WINDOW,
-    help="Window -20:80, or a list 20,60 [°C] [default: the tested one].",
+    help="Bound over -20:80 or at 20,60 [°C] [default: the tested temperature].",
 )
 @click.option(
-    "--content", default=0.99, help="Share of the population within each bound."
+    "--content", default=0.99, help="Set the share of the population per bound."
 )
-@click.option("--confidence", default=0.95, help="Confidence of each bound.")
-@click.option(
-    "--required-probability",
-    type=float,
-    help="Share of the population that a capacity has to hold [default: --content].",
-)
+@click.option("--confidence", default=0.95, help="Set the confidence of each bound.")
 @click.option(
     "--population",
     metavar="WHOSE",
-    help="readings, mountings or specimens [default: the widest that was tested].",
+    help="Bound readings, mountings or specimens [default: the widest tested].",
 )
 @click.option(
     "--quantity",
     type=click.Choice(["reading", "load"]),
     default="reading",
-    help="What the gauge shows, or what acts on the gear.",
+    help="Bound the reading of the gauge, or the load on the gear.",
 )
-@options.direction_option("Loading or unloading, in compression and in tension.")
+@options.direction_option("Bound the force on loading or unloading.")
 @options.tolerance_option
 @options.seed_option
-@options.folder_options("Write a result folder with a report.")
+@options.folder_options("Write a result folder with a report to DIR.")
 @options.json_option
 @click.option(
     "--certificate",
     is_flag=True,
-    help="Also write a certificate to sign, one A4 page.",
+    help="Write a certificate to sign, one A4 page.",
 )
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
-    """Bound the force needed at a deformation, from RUN.
+    """Bound the force at a deformation, from RUN.
 
-    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
-    could not separate are averaged over by their probability. From a folder of `hdcal
-    fleet` it bounds what the next gears need.
+    RUN is a result folder of `hdcal calibrate`, `diagnose` or `fleet`. Hypotheses of a
+    diagnosis are averaged by their probability; from a fleet, future gears are bounded.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.prediction.margin.margin import margin as bounds_of

@@ -5,16 +5,12 @@ from typing import Literal
 from hdcal.prediction.margin.request import Rule
 from hdcal.report.item import Item, Probability, quantity
 
-Statement = Literal["conforms", "does not conform", "undecided"]
-
 
 class Conformity(Item):
     """Decision on one member; limit and guard band are sizes along the loading.
 
     Attributes:
-        rule: guarded or simple.
-        limit_N: the limit.
-        guard_band_N: how far the acceptance limit lies below it.
+        guard_band_N: how far the acceptance limit lies below the limit.
         acceptance_limit_N: largest estimate that is accepted.
         probability_of_conformity: that one future member keeps the limit; a lower limit
             where the draws do not resolve it.
@@ -25,7 +21,7 @@ class Conformity(Item):
     limit_N: float = quantity("limit", "N")
     guard_band_N: float = quantity("guard band", "N")
     acceptance_limit_N: float = quantity("acceptance limit", "N")
-    statement: Statement
+    statement: Literal["conforms", "does not conform", "undecided"]
     probability_of_conformity: Probability
     false_accept_risk: Probability
 

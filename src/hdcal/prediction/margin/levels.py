@@ -1,118 +1,149 @@
-"""Force at each temperature, and the bounds of each model.
+"""Force at each temperature with its bounds, and the exceedance of a limit.
 
 A reading lies within half a step of the force: bounds, capacities and the interval of
 the share above the limit are for the worst place of the force in a step. In the
 interval of one member and its probability of exceedance the rounding is a component.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
+from scipy.special import ndtri
 
 from hdcal.prediction.conditions import SENSE, is_tested
-from hdcal.prediction.margin.exceedance import exceedance
+from hdcal.prediction.joint import JointModel
 from hdcal.prediction.margin.request import MarginRequest
-from hdcal.prediction.margin.result import Level, ModelBound
 from hdcal.prediction.members import Members, one_member, over_draws
-from hdcal.prediction.models import Model
-from hdcal.report.item import TAILS, Interval
+from hdcal.prediction.shares import RAREST
+from hdcal.report.item import TAILS, Interval, Item, Probability, quantity
+
+# Largest relative Monte Carlo error of a probability that is a number. Of an event that
+# n independent draws do not show, the probability is below 3/n with 95 % confidence.
+_ROUGH, _UNSEEN = 0.3, 3.0
+
+
+class Exceedance(Item):
+    """How probable it is that a member needs more than the capacity.
+
+    Attributes:
+        probability: of one future member, over all draws; an upper limit with 95 %
+            confidence where the draws do not resolve it.
+        lo, hi: 95 % credible interval of the share of the population.
+        at_confidence: share that is not exceeded with the stated confidence.
+        beta: reliability index −Φ⁻¹(P); a lower limit where P is an upper one.
+    """
+
+    probability: Probability = quantity("probability that a member exceeds the limit")
+    error: float = quantity("Monte Carlo standard error of the probability")
+    resolved: bool = quantity("whether the draws resolve the probability")
+    lo: Probability = quantity("share of members above the limit, lower end")
+    hi: Probability = quantity("share of members above the limit, upper end")
+    at_confidence: Probability = quantity("share of members above, confidence bound")
+    beta: float = quantity("reliability index")
+
+
+class Level(Item):
+    """The force at one temperature.
+
+    Attributes:
+        tested: the data hold this deformation, temperature and direction.
+        force_N: mean of the population, 95 % credible interval.
+        member_N: one future member, 95 % predictive interval.
+        lower_bound_N: exceeded by the share `content`, with the stated confidence.
+        upper_bound_N: not exceeded by that share, with that confidence.
+        capacity_N: least that holds that share, with that confidence; a size along the
+            direction of loading.
+        capacity_median_N: the same with a confidence of a half.
+    """
+
+    temperature_C: float = quantity("temperature", "°C")
+    tested: bool = quantity("tested")
+    force_N: Interval = quantity("mean", "N")
+    member_N: Interval = quantity("one member", "N")
+    lower_bound_N: float = quantity("lower bound", "N")
+    upper_bound_N: float = quantity("upper bound", "N")
+    capacity_N: float = quantity("required capacity", "N")
+    capacity_median_N: float = quantity("required capacity, 50 % confidence", "N")
+    exceedance: Exceedance | None = quantity("limit exceeded")
 
 
 def force_levels(
-    found: Sequence[Model], asked: MarginRequest, members: Members, step: float
+    model: JointModel, asked: MarginRequest, members: Members, step: float
 ) -> tuple[Level, ...]:
     """Return the force at each temperature.
 
     Args:
-        found: the models.
+        model: of the members.
         asked: the request.
-        members: of all models, one row for each temperature.
+        members: one row for each temperature.
         step: of a reading, 0 for a load [N].
     """
-    sign, half, weight = asked.direction_of_loading, 0.5 * step, members.weight
-    low, high = _bounds(members, asked, half)
-    needed = members.quantile(asked.required)
-    least, capacity = over_draws(needed, weight, [0.5, asked.confidence]) + half
-    mean = sign * over_draws(members.centre, weight, TAILS)
+    sign, half, sure = asked.loading_sense, 0.5 * step, asked.confidence
+    most, least = (members.quantile(p) for p in (asked.content, 1.0 - asked.content))
+    median, capacity = over_draws(most, [0.5, sure]) + half
+    ends = [over_draws(least, 1.0 - sure) - half, capacity]
+    low, high = np.sort(sign * np.stack(ends), axis=0)
+    mean = np.sort(sign * over_draws(members.centre, TAILS), axis=0)
     one = one_member(members, step / 12.0**0.5)
-    member = sign * np.stack([one.quantile(tail)[0] for tail in TAILS])
+    member = [sign * one.quantile(tail)[0] for tail in TAILS][::sign]
     tested = is_tested(
-        found[0].posterior.case.records,
-        deformation=asked.deformation,
-        temperature=asked.temperature,
+        model.posterior.case.records,
+        deformation=asked.deformation_mm,
+        temperature=asked.temperatures_C,
         sense=sign * SENSE[asked.direction],
     )
-    above = None
-    if asked.limit_force is not None:
-        # At the least, with the rounding as a component, and at the most.
-        rounded = replace(members, sd=np.hypot(members.sd, step / 12.0**0.5))
-        above = np.stack(
-            [
-                members.above(asked.limit_force + half),
-                rounded.above(asked.limit_force),
-                members.above(asked.limit_force - half),
-            ]
-        )
+    above = [None] * len(low)
+    if asked.limit_force_N is not None:
+        above = _exceedances(model, asked, members, step)
     return tuple(
         Level(
             temperature_C=float(warm),
             tested=bool(tested[row]),
             force_N=_interval(mean[:, row]),
-            member_N=_interval(member[:, row]),
+            member_N=_interval([end[row] for end in member]),
             lower_bound_N=float(low[row]),
             upper_bound_N=float(high[row]),
             capacity_N=float(capacity[row]),
-            capacity_median_N=float(least[row]),
-            exceedance=None
-            if above is None
-            else exceedance(above[:, :, row], weight, found, asked.confidence),
+            capacity_median_N=float(median[row]),
+            exceedance=above[row],
         )
-        for row, warm in enumerate(asked.temperature)
+        for row, warm in enumerate(asked.temperatures_C)
     )
 
 
-def model_bounds(
-    found: Sequence[Model], parts: Sequence[Members], asked: MarginRequest, step: float
-) -> tuple[ModelBound, ...]:
-    """Return the bounds of each of several models; of one none.
+def _interval(ends) -> Interval:
+    lo, median, hi = map(float, ends)
+    return Interval(median=median, lo=lo, hi=hi)
 
-    Args:
-        found: the models.
-        parts: the members of each at one condition.
-        asked: the request.
-        step: of a reading, 0 for a load [N].
-    """
-    if len(found) == 1:
-        return ()
-    bounds = []
-    for model, part in zip(found, parts, strict=True):
-        low, high = _bounds(part, asked, 0.5 * step)[:, 0]
-        bounds.append(
-            ModelBound(
-                model=model.name,
-                probability=model.probability,
-                lower_bound_N=float(low),
-                upper_bound_N=float(high),
+
+def _exceedances(
+    model: JointModel, asked: MarginRequest, members: Members, step: float
+) -> list[Exceedance]:
+    """Return the probability of exceedance at each temperature."""
+    limit, half = asked.limit_force_N or 0.0, 0.5 * step
+    wide = np.hypot(members.sd, step / 12.0**0.5)
+    # At the least, with the rounding as a component, and at the most.
+    least = members.above(limit + half)
+    usual = Members(members.share, members.mean, wide).above(limit)
+    most = members.above(limit - half)
+    low = over_draws(least, TAILS[0])
+    high, sure = over_draws(most, [TAILS[2], asked.confidence])
+    found = []
+    for row, mean in enumerate(usual.mean(axis=0)):
+        error = float(usual[:, row].std() / model.independent_draws**0.5)
+        # Without scatter no draw may lie above the limit: no probability of zero.
+        rough = error > _ROUGH * mean or mean == 0.0
+        resolved = bool(not rough and mean >= RAREST)
+        if rough:
+            mean = mean + _UNSEEN / model.independent_draws
+        mean = float(np.clip(mean, RAREST, 1.0))
+        found.append(
+            Exceedance(
+                probability=mean,
+                error=error,
+                resolved=resolved,
+                lo=float(low[row]),
+                hi=float(high[row]),
+                at_confidence=float(sure[row]),
+                beta=float(-ndtri(min(mean, 1.0 - 1e-16))),
             )
         )
-    return tuple(bounds)
-
-
-def _bounds(members: Members, asked: MarginRequest, half: float) -> np.ndarray:
-    """Return lower and upper bounds with the sign of the force [N], (2, row)."""
-    shares = (
-        (asked.content, asked.confidence),
-        (1.0 - asked.content, 1.0 - asked.confidence),
-    )
-    high, low = (
-        over_draws(members.quantile(content), members.weight, [confidence])[0]
-        for content, confidence in shares
-    )
-    ends = np.stack([low - half, high + half])
-    return np.sort(asked.direction_of_loading * ends, axis=0)
-
-
-def _interval(quantiles: np.ndarray) -> Interval:
-    low, median, high = map(float, quantiles)
-    return Interval(median=median, lo=min(low, high), hi=max(low, high))
+    return found

@@ -6,7 +6,6 @@ With a normal population and the reference prior it is the classical tolerance l
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,36 +14,25 @@ from hdcal.inference.force_model.residuals import noise_warnings
 from hdcal.prediction.conditions import (
     Conditions,
     Direction,
+    Population,
     beyond_tested,
-    direction_of_loading,
-    usual_temperature,
 )
 from hdcal.prediction.forces import Quantity
+from hdcal.prediction.joint import joint
 from hdcal.prediction.margin.budget import budget
 from hdcal.prediction.margin.decision import Conformity, decide
-from hdcal.prediction.margin.levels import force_levels, model_bounds
+from hdcal.prediction.margin.levels import Level, force_levels
 from hdcal.prediction.margin.reached import deformation_reached
-from hdcal.prediction.margin.request import (
-    MarginRequest,
-    Rule,
-    require_answerable,
-    require_numbers,
-)
-from hdcal.prediction.margin.result import CalibrationSource, Level, Margin
-from hdcal.prediction.members import joined
+from hdcal.prediction.margin.request import MarginRequest, Rule, checked_request
+from hdcal.prediction.margin.result import CalibrationSource, Margin
 from hdcal.prediction.models import (
-    Model,
     Models,
     averaging_words,
     left_out_of,
-    models_of,
     probabilities,
 )
-from hdcal.prediction.population import Population, widest
 from hdcal.prediction.simulate import simulate
 from hdcal.prediction.sizes import SIZES
-from hdcal.report.item import INTERVAL
-from hdcal.versions import versions
 
 
 def margin(
@@ -56,7 +44,6 @@ def margin(
     given_force: float | None = None,
     content: float = 0.99,
     confidence: float = 0.95,
-    required_probability: float | None = None,
     population: Population | None = None,
     quantity: Quantity = "reading",
     direction: Direction = "up",
@@ -76,7 +63,6 @@ def margin(
         given_force: force [N] whose deformation is asked for, with its sign.
         content: share of the population within each one-sided bound.
         confidence: of each bound.
-        required_probability: that a capacity is to hold; the content by default.
         population: whose force; by default the widest that the data support.
         quantity: `reading` of the rig's gauge, or `load` on the gear.
         direction: up to load, away from the unloaded gear; down to unload. In tension
@@ -89,67 +75,42 @@ def margin(
         NotUsable: a calibration failed its checks.
         InputError: what is asked cannot be answered; holds every finding.
     """
-    require_numbers(
+    model = joint(models)
+    asked = checked_request(
+        model,
+        deformation,
         temperature,
-        deformation=deformation,
         limit_force=limit_force,
         given_force=given_force,
         content=content,
         confidence=confidence,
-        required_probability=required_probability,
-    )
-    found = models_of(models)
-    case = found[0].posterior.case
-    warm = usual_temperature(case) if temperature is None else temperature
-    asked = MarginRequest(
-        deformation=deformation,
-        temperature=np.atleast_1d(np.asarray(warm, float)),
-        direction_of_loading=direction_of_loading(found, deformation),
-        limit_force=None if limit_force is None else abs(limit_force),
-        given_force=given_force,
-        content=content,
-        confidence=confidence,
-        required=content if required_probability is None else required_probability,
-        population=population or widest(found[0].problem),
+        population=population,
         quantity=quantity,
         direction=direction,
-        tolerances={n: float(by) for n, by in (tolerances or {}).items()},
-        rule=rule or "guarded",
+        tolerances=tolerances,
+        rule=rule,
         seed=seed,
     )
-    require_answerable(found, asked, limit_force, rule)
-    return _answered(found, asked, models)
-
-
-def _answered(found: tuple[Model, ...], asked: MarginRequest, models: Models) -> Margin:
-    posterior, sign = found[0].posterior, asked.direction_of_loading
+    posterior, sign = model.posterior, asked.loading_sense
+    case, theory = posterior.case, posterior.theory
     at = Conditions.of(
-        asked.deformation,
-        asked.temperature,
+        asked.deformation_mm,
+        asked.temperatures_C,
         sign,
         asked.direction == "down",
         quantity=asked.quantity,
-        tolerances={SIZES[n]: by for n, by in asked.tolerances.items() if by > 0.0},
+        tolerances={SIZES[n]: by for n, by in asked.tolerances_mm.items() if by > 0.0},
     )
-    parts = [simulate(m, at, asked.population, seed=asked.seed) for m in found]
-    step = float(found[0].problem.step) if asked.quantity == "reading" else 0.0
-    levels = force_levels(found, asked, joined(parts), step)
-    # The larger bound in size, along the direction of loading.
-    outer = [
-        level.upper_bound_N if sign > 0 else -level.lower_bound_N for level in levels
-    ]
-    row = int(np.argmax(outer))
-    worst, here = levels[row], [part.row(row) for part in parts]
-    rows, estimate, sd = budget(
-        found, here, step / 12.0**0.5, sign, posterior.case.units
-    )
+    members = simulate(model, at, asked.population, seed=asked.seed)
+    step = float(model.problem.step) if asked.quantity == "reading" else 0.0
+    levels = force_levels(model, asked, members, step)
+    row = int(np.argmax([level.capacity_N for level in levels]))
+    worst, here = levels[row], members.row(row)
+    rows, estimate, sd = budget(model, here, step / 12.0**0.5, sign)
     expanded = 0.5 * (worst.member_N.hi - worst.member_N.lo)
-    whole = joined(here)
-    bend = sign * whole.common["bend"][:, 0]
-    mean = float(whole.weight @ bend)
+    bend = sign * here.common["bend"]
     return Margin(
-        **_asked(asked),
-        **_source(found, models),
+        **dict(asked),
         levels=levels,
         worst=worst,
         estimate_N=estimate,
@@ -158,60 +119,32 @@ def _answered(found: tuple[Model, ...], asked: MarginRequest, models: Models) ->
         expanded_uncertainty_N=expanded,
         budget=rows,
         decision=_decision(asked, worst, estimate),
-        reached=deformation_reached(found, asked, at, worst.temperature_C),
-        models=model_bounds(found, here, asked, step),
-        beyond_tested=beyond_tested(asked.deformation, posterior.case.records),
-        interval=INTERVAL,
-        bend_N=(mean, float(whole.weight @ (bend - mean) ** 2) ** 0.5),
-        turn_mm=float(at.turn(posterior.case.records)[0]),
-    )
-
-
-def _asked(asked: MarginRequest) -> dict[str, Any]:
-    """Return the fields of a margin that state the request."""
-    return {
-        "deformation_mm": float(asked.deformation),
-        "direction": asked.direction,
-        "loading_sense": asked.direction_of_loading,
-        "quantity": asked.quantity,
-        "population": asked.population,
-        "content": asked.content,
-        "confidence": asked.confidence,
-        "required_probability": asked.required,
-        "limit_force_N": asked.limit_force,
-        "tolerances_mm": dict(asked.tolerances),
-        "seed": asked.seed,
-    }
-
-
-def _source(found: tuple[Model, ...], models: Models) -> dict[str, Any]:
-    """Return the fields of a margin that state models and data."""
-    posterior = found[0].posterior
-    case, theory = posterior.case, posterior.theory
-    return {
-        "causes": probabilities(found),
-        "weight_left_out": left_out_of(models),
-        "averaging": tuple(averaging_words(models)),
-        "warnings": noise_warnings(posterior),
-        "posterior": posterior,
-        "data": CalibrationSource(
+        reached=deformation_reached(model.models, asked, at, worst.temperature_C),
+        beyond_tested=beyond_tested(asked.deformation_mm, case.records),
+        bend_N=(float(bend.mean()), float(bend.std())),
+        turn_mm=float(at.turn(case.records)[0]),
+        causes=probabilities(model.models),
+        weight_left_out=left_out_of(models),
+        averaging=tuple(averaging_words(models)),
+        warnings=noise_warnings(posterior),
+        posterior=posterior,
+        data=CalibrationSource(
             gear=case.gear.name,
             theory=theory,
             name=case.name,
             rows=len(case.records.force),
             sha256=case.data_sha256,
         ),
-        "versions": versions(),
-        "part": "part" if theory == SPRING else "gear",
-        "units": case.units,
-    }
+        part="part" if theory == SPRING else "gear",
+        units=case.units,
+    )
 
 
 def _decision(asked: MarginRequest, worst: Level, estimate: float) -> Conformity | None:
-    if asked.limit_force is None or worst.exceedance is None:
+    if asked.limit_force_N is None or worst.exceedance is None:
         return None
-    sign, span = asked.direction_of_loading, worst.member_N
+    sign, span = asked.loading_sense, worst.member_N
     low, high = sorted((sign * span.lo, sign * span.hi))
     # The rounding is a component of the interval: it is in the limit only once.
-    numbers = asked.limit_force, sign * estimate, low, high
+    numbers = asked.limit_force_N, sign * estimate, low, high
     return decide(asked.rule, *numbers, worst.exceedance.probability)

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.prediction.conditions import NEAR_MM, Conditions
+from hdcal.prediction.joint import join
 from hdcal.prediction.margin.request import MarginRequest
-from hdcal.prediction.margin.result import Reached
 from hdcal.prediction.members import over_draws
 from hdcal.prediction.models import Model
-from hdcal.prediction.simulate import simulate_all
-from hdcal.report.item import TAILS
+from hdcal.prediction.simulate import simulate
+from hdcal.report.item import TAILS, Item
+from hdcal.report.item import quantity as labelled
 
 # Searched up to this multiple of the tested deformation, at so many places, in so many
 # draws; between places the force is interpolated.
@@ -20,8 +21,30 @@ _REACH, _PLACES, _DRAWS = 2.0, 65, 1000
 _NONE = 1e6
 
 
+class Reached(Item):
+    """The deformation that a force reaches; None where it is not reached in the range.
+
+    Attributes:
+        searched_mm: range of deformation.
+        median_mm: of the mean member, with the ends of its 95 % credible interval.
+        lower_bound_mm: reached by the share `content`, with the stated confidence.
+        upper_bound_mm: not passed by that share, with that confidence.
+        tested: whether the data hold the whole of it.
+    """
+
+    force_N: float = labelled("given force", "N")
+    temperature_C: float = labelled("temperature", "°C")
+    searched_mm: tuple[float, float]
+    median_mm: float | None = labelled("deformation reached", "mm")
+    lo_mm: float | None = labelled("lower end", "mm")
+    hi_mm: float | None = labelled("upper end", "mm")
+    lower_bound_mm: float | None = labelled("lower bound", "mm")
+    upper_bound_mm: float | None = labelled("upper bound", "mm")
+    tested: bool
+
+
 def deformation_reached(
-    found: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
+    models: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
 ) -> Reached | None:
     """Return the deformation at which the members first need the given force.
 
@@ -29,16 +52,16 @@ def deformation_reached(
     there. A member reaches the first deformation at which it needs the force.
 
     Args:
-        found: the models.
+        models: over which the answer averages.
         asked: with the given force; without one there is no answer.
         at: conditions of the margin.
         warm: temperature of the answer [°C].
     """
-    force = asked.given_force
+    force, model = asked.given_force_N, join(models, _DRAWS)
     if force is None:
         return None
     sign = 1 if force > 0.0 else -1
-    records = found[0].posterior.case.records
+    records = model.posterior.case.records
     tested = np.sort(
         sign * np.array([records.deformation.min(), records.deformation.max()])
     )
@@ -50,16 +73,14 @@ def deformation_reached(
         loading=np.full(_PLACES, float(sign)),
         unloading=np.full(_PLACES, asked.direction == "down"),
     )
-    members = simulate_all(found, there, asked.population, seed=asked.seed).thinned(
-        _DRAWS
-    )
-    step = float(found[0].problem.step) if asked.quantity == "reading" else 0.0
+    members = simulate(model, there, asked.population, seed=asked.seed)
+    step = float(model.problem.step) if asked.quantity == "reading" else 0.0
     half, size, sure = 0.5 * step, abs(force), asked.confidence
 
     def first(curve: np.ndarray, needed: float, shares: Sequence[float]):
         place = first_crossing(curve, needed, places)
         ends = np.clip(place, -1e3 * _NONE, 1e3 * _NONE)
-        found = over_draws(ends[:, None], members.weight, shares)[:, 0]
+        found = over_draws(ends[:, None], shares)[:, 0]
         return [sign * float(x) if abs(x) < _NONE else None for x in found]
 
     middle = first(members.centre, size, TAILS)[::sign]

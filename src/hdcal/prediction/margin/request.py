@@ -1,10 +1,10 @@
 """Request of a margin, and what is wrong with one."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
+from pydantic import Field
 
 from hdcal.data.plausible import implausible
 from hdcal.data.priors import rig_priors
@@ -16,62 +16,145 @@ from hdcal.prediction.conditions import (
     OFF,
     SENSE,
     Direction,
+    Population,
+    direction_of_loading,
     excluded_findings,
     far_findings,
+    population_findings,
     temperature_findings,
+    usual_temperature,
+    widest,
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
-from hdcal.prediction.models import Model
-from hdcal.prediction.population import Population, population_findings
+from hdcal.prediction.joint import JointModel
 from hdcal.prediction.shares import share_findings
 from hdcal.prediction.sizes import check_tolerances
-from hdcal.quantities import Quantities
+from hdcal.report.item import Count, Draws, Item
+from hdcal.report.item import quantity as labelled
 
 Rule = Literal["guarded", "simple"]
 RULES: tuple[Rule, ...] = get_args(Rule)
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 # Temperatures of one answer, at each of which every draw has a force.
 _MOST_TEMPERATURES = 1_000
 
 
-@dataclass(frozen=True, kw_only=True)
-class MarginRequest:
-    """Request of a margin; the attributes are those of `margin`.
+class MarginRequest(Item):
+    """Request of a margin.
 
     Attributes:
-        temperature: of the specimen [°C], (t,).
-        direction_of_loading: +1 in compression, -1 in tension.
-        limit_force: size of the capacity [N], or None.
+        direction: up to load, down to unload.
+        loading_sense: +1 in compression, -1 in tension; capacities and what
+            exceeds them are sizes along it, forces and bounds have their sign.
+        quantity: reading of the rig, or load on the gear.
+        population: readings, mountings or specimens.
+        content: share of the population within each one-sided bound.
+        confidence: of each bound.
+        limit_force_N: capacity asked about, its size.
+        tolerances_mm: ± of the sizes by name.
+        given_force_N: force with its sign whose deformation is asked for.
+        temperatures_C: of the specimen.
+        rule: of the decision about the limit.
     """
 
-    deformation: float
-    temperature: np.ndarray
-    direction_of_loading: int
-    limit_force: float | None
-    given_force: float | None
-    content: float
-    confidence: float
-    required: float
-    population: Population
-    quantity: Quantity
+    deformation_mm: float = labelled("deformation", "mm")
     direction: Direction
-    tolerances: Mapping[str, float]
-    rule: Rule
-    seed: int
+    loading_sense: Literal[1, -1]
+    quantity: Quantity
+    population: Population
+    content: Share
+    confidence: Share
+    limit_force_N: float | None = labelled("limit", "N")
+    tolerances_mm: dict[str, float]
+    seed: Count
+    given_force_N: float | None = Field(exclude=True)
+    temperatures_C: Draws
+    rule: Rule = Field(exclude=True)
 
 
-def require_numbers(temperature, **asked) -> None:
-    """Check that each question is about one number.
+def checked_request(
+    model: JointModel,
+    deformation: float,
+    temperature: Any,
+    *,
+    limit_force: float | None,
+    given_force: float | None,
+    content: float,
+    confidence: float,
+    population: Population | None,
+    quantity: Quantity,
+    direction: Direction,
+    tolerances: Mapping[str, float] | None,
+    rule: Rule | None,
+    seed: int,
+) -> MarginRequest:
+    """Return the request that the arguments of `margin` make.
 
     Raises:
-        InputError: it is not.
+        InputError: holds everything that is wrong with them.
     """
+    posterior, problem = model.posterior, model.problem
+    case, sizes = posterior.case, dict(tolerances or {})
+    warm = usual_temperature(case) if temperature is None else temperature
+    numbers = {"deformation": deformation, "content": content, "confidence": confidence}
+    numbers |= {"limit_force": limit_force, "given_force": given_force}
     with Findings() as wrong:
-        for name, given in asked.items():
+        for name, given in numbers.items():
             if given is not None and _axes(given) != 0:
                 words, remedy = "is not one number", "Ask for one at a time"
                 wrong.append(Finding(name, words, remedy))
-        if temperature is not None and _axes(temperature) not in (0, 1):
+        if _axes(warm) not in (0, 1):
             wrong.append(Finding("temperature", "is no list of numbers", "Give °C"))
+    levels = np.atleast_1d(np.asarray(warm, float))
+    loading = direction_of_loading(model, deformation)
+    movement = loading * SENSE.get(direction, 0.0)
+    population = population or widest(problem)
+    with Findings() as wrong:
+        impossible = [*_deformation(posterior, deformation, movement)]
+        wrong += impossible
+        wrong += _temperatures(model, levels)
+        shares, more = (
+            {"content": content, "confidence": confidence},
+            ", or calibrate with more draws",
+        )
+        wrong += share_findings(shares, model.size, more)
+        wrong += implausible("seed", seed)
+        wrong += population_findings(population, problem)
+        wrong += check_tolerances(sizes, case.gear.geometry, posterior.theory)
+        # Beside a deformation that is refused no force looks right.
+        if not impossible:
+            for name in ("limit_force", "given_force"):
+                wrong += _force(model, name, numbers[name], deformation, loading)
+        for name, value, known in (
+            ("quantity", quantity, QUANTITIES),
+            ("direction", direction, DIRECTIONS),
+            ("rule", rule or "guarded", RULES),
+        ):
+            if value not in known:
+                remedy = f"Use {' or '.join(known)}"
+                wrong.append(Finding(name, f"'{value}' is unknown", remedy))
+        if rule is not None and limit_force is None:
+            words, remedy = "decides nothing without a limit", "Give `limit_force` too"
+            wrong.append(Finding("rule", words, remedy))
+        if quantity == "load" and not _knows_contact(posterior):
+            words = "needs the place of first contact, and the readings are far from 0"
+            remedy = "State deformation_offset in [priors], or count from there"
+            wrong.append(Finding("quantity", words, remedy))
+    return MarginRequest(
+        deformation_mm=float(deformation),
+        direction=direction,
+        loading_sense=loading,
+        quantity=quantity,
+        population=population,
+        content=content,
+        confidence=confidence,
+        limit_force_N=None if limit_force is None else abs(limit_force),
+        tolerances_mm={name: float(by) for name, by in sizes.items()},
+        seed=seed,
+        given_force_N=given_force,
+        temperatures_C=levels,
+        rule=rule or "guarded",
+    )
 
 
 def _axes(given: object) -> int | None:
@@ -81,51 +164,6 @@ def _axes(given: object) -> int | None:
     except (TypeError, ValueError):
         return None
     return None if isinstance(given, str) else found.ndim
-
-
-def require_answerable(
-    models: Sequence[Model],
-    asked: MarginRequest,
-    limit_force: float | None,
-    rule: str | None,
-) -> None:
-    """Check a request, all of it at once.
-
-    Args:
-        models: the most probable first.
-        asked: the request.
-        limit_force: as given, with its sign.
-        rule: as given.
-
-    Raises:
-        InputError: holds every finding.
-    """
-    main, posterior = models[0], models[0].posterior
-    case, gear, at = posterior.case, posterior.case.gear, asked.deformation
-    movement = asked.direction_of_loading * SENSE.get(asked.direction, 0.0)
-    with Findings() as wrong:
-        impossible = [*_deformation(posterior, at, movement)]
-        wrong += impossible
-        wrong += _temperatures(main, asked.temperature)
-        shares = {"content": asked.content, "confidence": asked.confidence}
-        if asked.required != asked.content:
-            shares["required_probability"] = asked.required
-        wrong += share_findings(
-            shares,
-            sum(model.size for model in models),
-            ", or calibrate with more draws",
-        )
-        wrong += implausible("seed", asked.seed)
-        wrong += population_findings(asked.population, main.problem)
-        wrong += check_tolerances(asked.tolerances, gear.geometry, posterior.theory)
-        # Beside a deformation that is refused no force looks right.
-        if not impossible:
-            wrong += _forces(main, asked, limit_force, case.units)
-        wrong += _choices(asked, rule)
-        if asked.quantity == "load" and not _knows_contact(posterior):
-            words = "needs the place of first contact, and the readings are far from 0"
-            remedy = "State deformation_offset in [priors], or count from there"
-            wrong.append(Finding("quantity", words, remedy))
 
 
 def _deformation(
@@ -145,55 +183,36 @@ def _deformation(
         yield from excluded_findings(posterior.case, deformation, movement)
 
 
-def _temperatures(main: Model, temperature: np.ndarray) -> list[Finding]:
+def _temperatures(model: JointModel, temperature: np.ndarray) -> list[Finding]:
     name = "temperature"
     if temperature.size == 0 or not np.isfinite(temperature).all():
         return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
     if temperature.size > _MOST_TEMPERATURES:
         words = f"{temperature.size} temperatures are too many"
         return [Finding(name, words, f"Give at most {_MOST_TEMPERATURES}")]
-    return temperature_findings(main.posterior.case.gear, main.draws, temperature)
+    return temperature_findings(model.posterior.case.gear, model.draws, temperature)
 
 
-def _forces(
-    main: Model, asked: MarginRequest, limit_force: float | None, units: Quantities
+def _force(
+    model: JointModel, name: str, force: float | None, at: float, loading: int
 ) -> Iterator[Finding]:
-    at, unit = asked.deformation, units.load_unit
-    usual = abs(float(np.median(main.draws["stiffness"])) * at)
-    for name, force in (
-        ("limit_force", limit_force),
-        ("given_force", asked.given_force),
-    ):
-        if force is None:
-            continue
-        if wrong := implausible(name, force):
-            yield from wrong
-        elif force == 0.0:
-            words = f"{force:g} {unit} is no {units.load}"
-            yield Finding(name, words, f"Give a number of {unit}")
-        elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
-            place = f"{at:g} {units.displacement_unit}"
-            words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
-            yield Finding(name, words, f"Give it in {unit}")
-        elif name == "limit_force" and force < 0.0 < asked.direction_of_loading:
-            words = f"{force:g} {unit} is no limit of the {units.load} at "
-            words += f"{at:g} {units.displacement_unit}, which is positive"
-            remedy = f"Give {-force:g} {unit}, or ask at a negative "
-            yield Finding(name, words, remedy + units.displacement)
-
-
-def _choices(asked: MarginRequest, rule: str | None) -> Iterator[Finding]:
-    for name, value, known in (
-        ("quantity", asked.quantity, QUANTITIES),
-        ("direction", asked.direction, DIRECTIONS),
-        ("rule", asked.rule, RULES),
-    ):
-        if value not in known:
-            remedy = f"Use {' or '.join(known)}"
-            yield Finding(name, f"'{value}' is unknown", remedy)
-    if rule is not None and asked.limit_force is None:
-        words, remedy = "decides nothing without a limit", "Give `limit_force` too"
-        yield Finding("rule", words, remedy)
+    units = model.posterior.case.units
+    unit, place = units.load_unit, f"{at:g} {units.displacement_unit}"
+    usual = abs(float(np.median(model.draws["stiffness"])) * at)
+    if force is None:
+        return
+    if wrong := implausible(name, force):
+        yield from wrong
+    elif force == 0.0:
+        words = f"{force:g} {unit} is no {units.load}"
+        yield Finding(name, words, f"Give a number of {unit}")
+    elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
+        words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
+        yield Finding(name, words, f"Give it in {unit}")
+    elif name == "limit_force" and force < 0.0 < loading:
+        words = f"{force:g} {unit} is no limit of the {units.load} at {place}, "
+        remedy = f"Give {-force:g} {unit}, or ask at a negative {units.displacement}"
+        yield Finding(name, words + "which is positive", remedy)
 
 
 def _knows_contact(posterior: Posterior) -> bool:

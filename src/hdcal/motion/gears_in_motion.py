@@ -1,0 +1,142 @@
+"""The motions of many draws of a calibrated gear under one force."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from hdcal.errors import NotUsable
+from hdcal.exported import jit
+from hdcal.inference.force_model.priors import without_scatter
+from hdcal.inference.force_model.problem import MEMBERS, case_reading
+from hdcal.inference.force_model.values import Values
+from hdcal.physics.chain import Base
+from hdcal.physics.dynamics import Oscillator, acting, integrate
+from hdcal.physics.effect import parameters
+from hdcal.physics.forcing import Forcing
+from hdcal.physics.theory import Scalar
+from hdcal.prediction.joint import JointModel
+from hdcal.prediction.simulate import gear_leftover
+
+# The leftover of a draw at so many places, up to this multiple of the largest tested
+# deformation either way. A cubic spline between them keeps the integration smooth.
+_PLACES, _REACH = 121, 3.0
+# Sites of a draw: the ends of the spline [mm], and its coefficients, highest first.
+_ENDS, _LEFTOVER = "_leftover_ends", "_leftover"
+# Draws that are integrated together, and the largest number of their states.
+_CHUNK, _MOST_STATES = 250, 1_000_000
+
+
+def moving_draws(gears: JointModel, seed: int) -> dict[str, np.ndarray]:
+    """Return the draws of one gear, of one calibrated at rest with its leftover.
+
+    Args:
+        gears: the models of the gear.
+        seed: of the bend.
+    """
+    # Values of tested members may be many, and are no part of a gear in motion.
+    values = {n: v for n, v in gears.draws.items() if n not in MEMBERS.values()}
+    if gears.posterior.kind == "dynamic":
+        return values
+    far = _REACH * float(np.max(np.abs(gears.posterior.case.records.deformation)))
+    places = np.linspace(-far, far, _PLACES)
+    spline = CubicSpline(places, gear_leftover(gears, places, seed=seed), axis=1)
+    ends = np.tile(places[[0, -1]], (gears.size, 1))
+    return values | {_ENDS: ends, _LEFTOVER: np.moveaxis(spline.c, 2, 0)}
+
+
+def _leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
+    """Return the force of one draw outside base and effects, by the deformation [N].
+
+    It is zero at the unloaded gear; None of a gear that was calibrated in motion.
+    """
+    if _LEFTOVER not in value:
+        return None
+
+    def leftover(deformation: Scalar) -> Scalar:
+        low, high = value[_ENDS]
+        width = (high - low) / (_PLACES - 1)
+        place = jnp.clip(deformation, low, high) - low
+        part = jnp.clip(jnp.floor(place / width), 0, _PLACES - 2).astype(int)
+        return jnp.polyval(value[_LEFTOVER][:, part], place - part * width)
+
+    unloaded = leftover(0.0)
+    return lambda deformation: leftover(deformation) - unloaded
+
+
+def integrate_all(
+    gears: JointModel,
+    values: Values,
+    mass,
+    damping,
+    *,
+    force: Forcing,
+    times,
+    temperature: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the deformation of every draw, (draw, n), and its largest size [mm].
+
+    Args:
+        gears: the models of the gear.
+        values: from `moving_draws`.
+        mass: of each draw [N·s²/mm].
+        damping: of each draw [N·s/mm].
+        force: over time.
+        times: of the answer [s], (n,).
+        temperature: of the gear [°C].
+
+    Raises:
+        NotUsable: a gear gives way, or a motion could not be integrated.
+    """
+    case, (kept, _) = gears.posterior.case, acting(without_scatter(gears.effects))
+    about = case_reading(case), temperature, force, times, case.gear.reach
+    count, draws = len(mass), (values, mass, damping)
+    size = max(min(_CHUNK, _MOST_STATES // len(times)), 1)
+    motion, ends = np.empty((count, len(times))), []
+    # A computation of JAX does not react to an interruption: it runs in a thread.
+    pool = ThreadPoolExecutor(1)
+    try:
+        for first in range(0, count, size):
+            rows = slice(first, first + size)
+            part = jax.tree.map(lambda each, rows=rows: each[rows], draws)
+            found = pool.submit(_computed, part, *about, kept=kept).result()
+            motion[rows] = found[0]
+            ends.append(found[1:])
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+    peak, done, gone = map(np.concatenate, zip(*ends, strict=True))
+    if gone.any():
+        words = f"{np.count_nonzero(gone)} of {count} gears give way under this force"
+        remedy = "ask for a smaller amplitude, or measure that far, pulled and pushed"
+        raise NotUsable(f"{words}, up to {case.gear.reach:g} mm: {remedy}")
+    if not done.all():
+        words = f"{np.count_nonzero(~done)} of {count} motions could not be integrated"
+        raise NotUsable(f"{words}: ask for a shorter duration")
+    return motion, peak
+
+
+def _computed(*given, kept):
+    return jax.device_get(_moved(*given, kept=kept))
+
+
+@jit(static_argnames=("kept",))
+def _moved(draws, reading, at, force, times, reach, *, kept):
+    """Return deformation, peak and outcome of each draw."""
+
+    def one(draw):
+        value, mass, damping = draw
+        effects = tuple(
+            effect(**{n: value[f"{effect.name}.{n}"] for n in parameters(effect)})
+            for effect in kept
+        )
+        stiffness = value["stiffness"] / reading.radial_per_read
+        base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
+        leftover = _leftover_force(value)
+        gear = Oscillator(mass, damping, base, effects, reading, at, leftover)
+        motion = integrate(gear, force, times, reach)
+        return motion.deformation, motion.largest, motion.done, motion.gone
+
+    return jax.vmap(one)(draws)
