@@ -44,9 +44,6 @@ def track(console: Console, known, alarm_rows):
     except KeyboardInterrupt:
         console.words(f"interrupted after {tracker.rows} rows")
         return 130
-    except BrokenPipeError:
-        console.unread = True
-        discard_output()
     due = tracker.readings / alarm_rows
     console.words(
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
