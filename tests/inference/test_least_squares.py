@@ -21,7 +21,7 @@ SPRING = {
 
 def stiffness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     case = hdcal.read_case({"deformation_mm": x, "force_N": y}, gear=SPRING)
-    posterior = hdcal.calibrate(case, warmup=300, draws=2000)
+    posterior = hdcal.calibrate(case, warmup=300, draws=4000)
     assert posterior.usable
     return np.asarray(posterior.draws["stiffness"]).ravel()
 
@@ -37,7 +37,7 @@ def test_stiffness_and_interval_are_those_of_least_squares(rows: int, origin: fl
     half = stats.t.ppf(0.975, rows - 2) * line.stderr
     ends = np.quantile(stiffness(x, y), [0.025, 0.5, 0.975])
     expected = line.slope + half * np.array([-1.0, 0.0, 1.0])
-    # Ends of 8,000 draws have a Monte Carlo error of 0.8 % of the width.
+    # Ends of 16,000 draws have a Monte Carlo error of 0.6 % of the width.
     np.testing.assert_allclose(ends, expected, atol=0.02 * 2.0 * half)
 
 
@@ -55,16 +55,4 @@ def test_scale_and_origin_of_both_channels_change_nothing(
 ):
     moved = stiffness(scale_x * X + shift_x, scale_y * Y + shift_y)
     found = np.quantile(moved, [0.025, 0.5, 0.975]) * scale_x / scale_y
-    np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))
-
-
-@pytest.mark.thorough
-def test_the_order_of_rows_at_one_deformation_changes_nothing():
-    rng = np.random.default_rng(6)
-    x = np.repeat(np.linspace(0.0, 0.5, 12), 4)
-    y = 200.0 * x + rng.normal(0.0, 1.5, 48)
-    mixed = y.reshape(12, 4)[:, ::-1].ravel()
-    known, found = (
-        np.quantile(stiffness(x, values), [0.025, 0.5, 0.975]) for values in (y, mixed)
-    )
     np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))

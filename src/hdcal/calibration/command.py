@@ -32,13 +32,8 @@ if TYPE_CHECKING:
 @click.option(
     "--with-gap/--no-gap",
     default=None,
-    help="Fit what no effect explains as a smooth leftover discrepancy, or leave it "
-    "out [default: fit it where the readings show a bend; never with an effect].",
-)
-@click.option(
-    "--constant-noise",
-    is_flag=True,
-    help="Let the noise be of one size, also where it clearly grows with the force.",
+    help="Fit what no effect explains as a smooth leftover discrepancy, or not "
+    "[default: where the readings show a bend; never with an effect].",
 )
 @click.option(
     "--dynamic",
@@ -62,7 +57,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
 
     with console.wrong as wrong:
         effects = settings["effects"]
-        for name in ("with_gap", "constant_noise", "effects") if dynamic else ():
+        for name in ("with_gap", "effects") if dynamic else ():
             if settings.pop(name):
                 words = "does not go with --dynamic, which has no such model"
                 wrong.append(Finding(name, words, "Leave it out"))
@@ -79,7 +74,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
 
             if takes_straight_part(case):
                 case = read_given(console, data, **{**reading, "range": STRAIGHT})
-        # Said now, not after minutes of sampling.
+        # Refused now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"
         console.reserve_folder(out, force)
@@ -91,7 +86,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     from hdcal.calibration.calibrate import calibrate as sample
     from hdcal.calibration.calibration import calibration_of
 
-    settings["adapt_noise"] = not settings.pop("constant_noise")
     with progress_bar() as progress:
         posterior = sample(case, progress=progress, **settings)
     found = calibration_of(posterior)
