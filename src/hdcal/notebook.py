@@ -7,7 +7,6 @@ from typing import Any
 RESULTS = {
     "DynamicPosterior": "motion.dynamic_result.dynamic_calibration_of",
     "Posterior": "calibration.calibration.calibration_of",
-    "Residuals": "calibration.residual_report.residual_report",
 }
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from posteriors import (
     batch,
-    beside,
     plain_draws,
     ramp_case,
     regressed,
@@ -15,12 +14,11 @@ from posteriors import (
     with_leftover,
     written_posterior,
 )
-from rigs import cycles, make_case, make_gear
+from rigs import make_gear
 
 from hdcal.calibration.calibration import (
     Calibration,
     calibration_of,
-    tangent_stiffness,
 )
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import PLAUSIBLE, Check
@@ -63,7 +61,7 @@ def test_a_fixed_parameter_has_no_sampling_quality():
     found = calibration_of(replace(posterior, diagnoses=sampled))
     assert list(found.parameters)[-1] == "K"
     K = found.to_dict()["parameters"]["K"]
-    assert K["rhat"] is K["ess_bulk"] is K["prior_sensitivity"] is None
+    assert K["rhat"] is K["ess_bulk"] is None
     assert (K["driven_by"], K["contraction"]) == ("prior", 0.0)
 
 
@@ -95,8 +93,7 @@ def test_steps_are_ordered_and_each_has_a_sentence():
     check = Check(PLAUSIBLE, "warning", "K = 2e+03, expected 0.5 to 8")
     found = calibration_of(replace(posterior, checks=(check,)))
     assert found.steps == ("implausible", *plain.steps)
-    assert len(set(found.next_steps)) == len(found.steps)
-    assert found.next_step == found.next_steps[0]
+    assert found.next_step and found.next_step.startswith("First check the units")
 
 
 def test_a_shape_of_the_residuals_is_in_headline_and_steps():
@@ -133,25 +130,6 @@ def test_charts_show_readings_bands_and_densities():
     assert at == pytest.approx(207.0, abs=1.5) and density.high.max() == 1.0
 
 
-def test_in_tension_the_falling_branch_is_that_of_loading():
-    records = replace(cycles(24), temperature=np.full(24, 20.0))
-    records = replace(
-        records,
-        deformation=-records.deformation,
-        force=-200.0 * records.deformation,
-        sense=-records.sense,
-        direction=-records.sense,
-    )
-    case = make_case(records)
-    found = calibration_of(written_posterior(case, plain_draws(case, 400)))
-    lines = {
-        mark.label: mark.dash
-        for mark in found.charts()["calibration"].panels[0].marks
-        if isinstance(mark, Line) and mark.label
-    }
-    assert lines["median"] == "solid" and lines["median, unloading"] == "dashed"
-
-
 def test_a_spring_has_no_theories_and_its_K_is_the_stiffness():
     posterior = spring()
     found = calibration_of(posterior)
@@ -160,29 +138,3 @@ def test_a_spring_has_no_theories_and_its_K_is_the_stiffness():
     assert "E0" in found.parameters and "E0" not in found.measured
     page = found.page()
     assert "K under each theory" not in page and ">nan<" not in page
-
-
-@pytest.mark.parametrize(
-    ("effect", "values", "factor"),
-    [
-        ("contact_onset", {"ratio": 3.0, "onset": 0.2}, 4.0),
-        ("progressive_stiffening", {"slope": 0.4}, 1.0 + 2.0 * 0.4 * 0.495),
-        ("seating_slack", {"clearance": 0.05}, 1.0),
-    ],
-)
-def test_the_stiffness_at_the_end_has_the_effect_in_it(effect, values, factor):
-    rng, x = np.random.default_rng(1), np.linspace(0.02, 0.5, 25)
-    others = {f"{effect}__{name}": value for name, value in values.items()}
-    force = 100.0 * x + rng.normal(0.0, 0.2, len(x))
-    posterior = regressed(x, force, rng, effects=(effect,), **others)
-    found = tangent_stiffness(posterior)
-    assert found is not None and found.at_mm == 0.5
-    straight = np.quantile(posterior.draws["stiffness"], [0.025, 0.5, 0.975])
-    one = found.stiffness_N_per_mm
-    assert (one.lo, one.median, one.hi) == pytest.approx(factor * straight, rel=2e-3)
-
-
-@pytest.mark.parametrize("posterior", [single(size=20), None])
-def test_no_tangent_without_an_effect_that_changes_the_stiffness(posterior):
-    posterior = posterior or beside(single(size=20), "thermal_zero_drift")
-    assert tangent_stiffness(posterior) is None

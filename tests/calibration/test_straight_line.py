@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import Hdcal
-from scipy.signal import lfilter
-from scipy.stats import median_abs_deviation
 
 import hdcal
 from hdcal.calibration.straight_line import (
@@ -167,18 +165,3 @@ def test_calibrate_takes_the_straight_part_unless_all_is_asked_for(
     middle = answer["stiffness_N_per_mm"]["median"]
     assert middle == pytest.approx(expected, rel=0.02)
     assert "no straight line" in answer["headline"]
-
-
-@pytest.mark.thorough
-def test_correlated_noise_widens_the_slope_of_the_part():
-    """Stated and actual sd of the slope, with a correlation of 0.9 over 3,000 rows."""
-    found, x = [], np.linspace(0.0, 1.0, 3000)
-    for seed in range(30):
-        rng = np.random.default_rng(seed)
-        noise = lfilter([1.0], [1.0, -0.9], rng.normal(0.0, 0.05, len(x)))
-        part = read(x, 80.0 * np.maximum(x - 0.3, 0.0) + noise).screening.straight
-        found.append((part.slope, part.slope_sd))
-    slopes, stated = np.array(found).T
-    assert np.median(slopes) == pytest.approx(80.0, rel=0.002)
-    # Of one record in ten a wave of the noise is taken for a bend.
-    assert 0.6 < np.median(stated) / median_abs_deviation(slopes, scale="normal") < 1.8

@@ -10,11 +10,10 @@ from jsonschema import Draft202012Validator
 import hdcal
 from hdcal.calibration.calibration import calibration_of
 from hdcal.calibration.check.check import check
-from hdcal.cli.option_types import read_quantity, unit_findings
 from hdcal.errors import InputError
 from hdcal.fleets.reading.read_fleet import read_fleet
 from hdcal.fleets.reading.usable import usable
-from hdcal.quantities import FORCE, TORQUE
+from hdcal.quantities import TORQUE
 
 STIFFNESS = 9000.0  # [N·m/rad]
 SHORT = {"chains": 2, "warmup": 300, "draws": 1000, "seed": 1}
@@ -68,7 +67,6 @@ def _is_of_torques(answer: dict) -> bool:
     ("torque", "angle", "sizes"),
     [
         ("torque_Nm", "angle_rad", (1.0, 1.0)),
-        ("Moment (mNm)", "Drehwinkel (arcmin)", (1e-3, ARCMIN)),
         ("load [lbf*in]", "travel [deg]", (POUND_INCH, DEGREE)),
     ],
 )
@@ -161,34 +159,15 @@ def test_a_torsional_spring_has_no_sizes(gear, name):
         hdcal.read_case(_readings(1.0, 1.0, "torque_Nm", "angle_rad"), gear)
 
 
-def test_many_files_and_parquet_keep_their_quantities(tmp_path):
-    table = pd.DataFrame(_readings(1.0, ARCMIN, "Torque [Nm]", "Twist [arcmin]"))
-    folder = tmp_path / "gears"
-    folder.mkdir()
+def test_a_fleet_of_torques_refuses_forces(tmp_path):
+    table = _readings(1.0, ARCMIN, "Torque [Nm]", "Twist [arcmin]")
     for name in "abc":
-        table.to_csv(folder / f"{name}.csv", index=False)
-    gears = [table.assign(serial=name) for name in "abc"]
-    pd.concat(gears).to_parquet(tmp_path / "line.parquet", index=False)
-    for source in (folder, tmp_path / "line.parquet"):
-        found = read_fleet(source)
-        assert found.case.units is TORQUE
-        products = found.sums.products
-        slopes = products[:, 0, 3] / products[:, 0, 0]
-        assert np.max(found.case.records.deformation) < 12.01 * ARCMIN
-        assert slopes == pytest.approx(STIFFNESS, rel=0.02)
-    forces = {
-        "deformation_mm": range(6),
-        "force_N": [0.0, 20.1, 39.9, 60.2, 80.0, 99.8],
-    }
-    pd.DataFrame(forces).to_csv(folder / "d.csv", index=False)
+        _file(tmp_path, f"{name}.csv", table)
+    found = read_fleet(tmp_path)
+    assert found.case.units is TORQUE
+    products = found.sums.products
+    assert products[:, 0, 3] / products[:, 0, 0] == pytest.approx(STIFFNESS, rel=0.02)
+    forces = {"deformation_mm": range(6), "force_N": [0, 20.1, 39.9, 60.2, 80, 99.8]}
+    _file(tmp_path, "d.csv", forces)
     with pytest.raises(InputError, match="holds forces"):
-        usable(read_fleet(folder))
-
-
-def test_a_length_with_its_unit_is_no_angle():
-    given = {"deformation": read_quantity("0.4 mm", "--deformation", unit="mm")}
-    (finding,) = unit_findings(TORQUE, **given)
-    assert finding.where == "deformation"
-    assert not [*unit_findings(FORCE, **given)]
-    alone = read_quantity("0.004", "--deformation", unit="mm")
-    assert not [*unit_findings(TORQUE, deformation=alone)]
+        usable(read_fleet(tmp_path))

@@ -6,7 +6,6 @@ import jax
 import numpy as np
 import pytest
 from gauged import SDS, certified, told, with_gear
-from moving import TRUTH, moving_case, moving_gear
 from rigs import cycles, draw_truth, make_case, make_gear, make_records, ramp, simulate
 from scipy import stats
 from slices import slice_of
@@ -15,15 +14,10 @@ from structures import form_of
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.gear_file.certificates import ForceCertificate, certificate_priors
 from hdcal.data.priors import effect_priors
-from hdcal.inference.force_model.likelihood import log_likelihood, log_prior
+from hdcal.inference.force_model.likelihood import log_likelihood
+from hdcal.inference.force_model.priors import problem_priors
 from hdcal.inference.force_model.problem import build_problem
-from hdcal.inference.force_model.values import with_gains
 from hdcal.inference.posterior import Posterior
-from hdcal.motion.dynamic_problem import (
-    build_dynamic,
-    dynamic_site_priors,
-    predict_motion,
-)
 
 GAUGES = {"force_gain": 0.02, "deformation_gain": -0.013, "temperature_offset": 7.0}
 
@@ -40,8 +34,7 @@ KINDS = {
     "compressed, warm": (cycles(), (), {}, False),
     "members": (several(cycles()), (), {}, False),
     "leftover": (ramp(30), (), {}, True),
-    "rounded": (ramp(), (), {"resolution": 0.98}, False),
-    "diametral": (ramp(), (), {"reading": "diametral"}, False),
+    "rounded": (ramp(), (), {"resolution": 0.98, "reading": "diametral"}, False),
     "effects": (cycles(), ("hysteresis", "thermal_zero_drift"), {}, False),
     "effects, members": (several(cycles()), ("progressive_stiffening",), {}, True),
 }
@@ -68,45 +61,21 @@ def test_the_likelihood_of_what_was_read_is_the_same(kind: str):
     assert float(density(problem, bare)) != pytest.approx(found[0], rel=1e-6)
 
 
-def test_a_moving_gear_reads_the_same():
-    case = moving_case(1)
-    problems = [
-        build_dynamic(one, dynamic_site_priors(one, "ring"), "ring")
-        for one in (case, with_gear(case, certified(moving_gear())))
-    ]
-    start = {"alpha": 3e-4, "initial_deformation": 0.2, "initial_velocity": 0.0}
-    values = {**TRUTH, **start}
-    moved = told(values, **GAUGES)
-    # A gauge that shows more force shows more mass.
-    moved["mass"] = values["mass"] / with_gains(moved, 1.0)
-    motions = [
-        np.asarray(predict_motion(problem, given))
-        for problem, given in zip(problems, (values, moved), strict=True)
-    ]
-    np.testing.assert_allclose(motions[1], motions[0], rtol=1e-9)
-    assert problems[1].priors.keys() - problems[0].priors.keys() == SDS.keys()
-
-
 def test_mountings_add_to_the_zero_that_a_certificate_states():
     """The zero of n mountings' mean is the gauge's and the mean of n of theirs."""
     certificate = {"force_calibration": ForceCertificate(expanded_N=0.2)}
     gear = make_gear()
     gear = replace(gear, priors=gear.priors | certificate_priors(certificate))
-    case = make_case(several(ramp(12)), gear)
-    problem = build_problem(case, effect_priors(), structure=form_of(case))
-    grid = np.linspace(-3.0, 3.0, 60_001)
-    gauge = stats.norm.pdf(grid, 0.0, 0.1)
-    spread = {"run_offset_sd": np.float64(0.7)}
-    wide = problem.priors["run_offset_sd"].numbers[0]
-    for zero in (-0.5, 0.0, 0.8):
-        mountings = stats.norm.pdf(zero - grid, 0.0, 0.7 / np.sqrt(3.0))
-        density = np.log(np.trapezoid(gauge * mountings, grid))
-        density += stats.halfnorm.logpdf(0.7, scale=wide)
-        found = float(log_prior(problem, spread | {"force_offset": np.float64(zero)}))
-        assert found == pytest.approx(density, rel=1e-6)
-    # No certificate, or one mounting: as it is stated.
-    for other in (replace(problem, zero_stated=False), replace(problem, runs=0)):
-        assert other.priors_given({}) == problem.priors
+
+    def zero(records):
+        case = make_case(records, gear)
+        return problem_priors(case, (), effect_priors(), "ring")
+
+    found = zero(several(ramp(12)))
+    wide = found["run_offset_sd"].numbers[0]
+    expected = np.hypot(0.1, wide / np.sqrt(3.0))
+    assert found["force_offset"].numbers == pytest.approx((0.0, expected))
+    assert zero(ramp(12))["force_offset"].numbers == pytest.approx((0.0, 0.1))
 
 
 def precise(gear):

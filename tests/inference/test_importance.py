@@ -46,21 +46,6 @@ class Funnel(Sampled):
             numpyro.sample(f"place_{place}", dist.Normal(0.0, scale))
 
 
-class Hills(Sampled):
-    """Two modes of one weight, far apart."""
-
-    priors: dict[str, Prior]
-
-    def declare(self) -> None:
-        """Declare it."""
-        mixture = dist.MixtureSameFamily(
-            dist.Categorical(np.array([0.5, 0.5])),
-            dist.Normal(np.array([-20.0, 20.0]), 1.0),
-        )
-        for place in range(3):
-            numpyro.sample(f"place_{place}", mixture)
-
-
 @pytest.fixture(autouse=True)
 def _double():
     jax.config.update("jax_enable_x64", True)
@@ -96,9 +81,8 @@ def test_wrong_weights_would_be_noticed(monkeypatch):
     assert stats.kstest(size, stats.gamma(5.0).cdf).pvalue < 1e-6
 
 
-@pytest.mark.parametrize("problem", [Funnel({}), Hills({})])
-def test_what_proposals_do_not_cover_is_not_drawn(problem):
-    assert [drawn(problem, seed) for seed in range(3)] == [None] * 3
+def test_what_proposals_do_not_cover_is_not_drawn():
+    assert [drawn(Funnel({}), seed) for seed in range(3)] == [None] * 3
 
 
 def test_tails_heavier_than_any_proposal_are_drawn_right_or_not_at_all():

@@ -11,11 +11,6 @@ import hdcal
 LATER = partial(pytest.param, marks=pytest.mark.thorough)
 X = np.linspace(0.0, 0.5, 30)
 Y = 200.0 * X + np.random.default_rng(5).normal(0.0, 1.5, 30)
-# Monte Carlo error of an end of the interval in 8,000 draws, as a share of its width;
-# four of them, and four of a difference of two, are allowed.
-ERROR = 0.008
-ALLOWED = 4.0 * ERROR
-ALLOWED_DIFFERENCE = 4.0 * np.sqrt(2.0) * ERROR
 SPRING = {
     "name": "spring",
     "theory": "spring",
@@ -26,7 +21,7 @@ SPRING = {
 
 def stiffness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     case = hdcal.read_case({"deformation_mm": x, "force_N": y}, gear=SPRING)
-    posterior = hdcal.calibrate(case, warmup=300, draws=2000)
+    posterior = hdcal.calibrate(case, warmup=300, draws=4000)
     assert posterior.usable
     return np.asarray(posterior.draws["stiffness"]).ravel()
 
@@ -42,7 +37,8 @@ def test_stiffness_and_interval_are_those_of_least_squares(rows: int, origin: fl
     half = stats.t.ppf(0.975, rows - 2) * line.stderr
     ends = np.quantile(stiffness(x, y), [0.025, 0.5, 0.975])
     expected = line.slope + half * np.array([-1.0, 0.0, 1.0])
-    np.testing.assert_allclose(ends, expected, atol=ALLOWED * 2.0 * half)
+    # Ends of 16,000 draws have a Monte Carlo error of 0.6 % of the width.
+    np.testing.assert_allclose(ends, expected, atol=0.02 * 2.0 * half)
 
 
 @pytest.fixture(scope="module")
@@ -59,18 +55,4 @@ def test_scale_and_origin_of_both_channels_change_nothing(
 ):
     moved = stiffness(scale_x * X + shift_x, scale_y * Y + shift_y)
     found = np.quantile(moved, [0.025, 0.5, 0.975]) * scale_x / scale_y
-    width = float(known[2] - known[0])
-    np.testing.assert_allclose(found, known, atol=ALLOWED_DIFFERENCE * width)
-
-
-@pytest.mark.thorough
-def test_the_order_of_rows_at_one_deformation_changes_nothing():
-    rng = np.random.default_rng(6)
-    x = np.repeat(np.linspace(0.0, 0.5, 12), 4)
-    y = 200.0 * x + rng.normal(0.0, 1.5, 48)
-    mixed = y.reshape(12, 4)[:, ::-1].ravel()
-    known, found = (
-        np.quantile(stiffness(x, values), [0.025, 0.5, 0.975]) for values in (y, mixed)
-    )
-    width = float(known[2] - known[0])
-    np.testing.assert_allclose(found, known, atol=ALLOWED_DIFFERENCE * width)
+    np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))

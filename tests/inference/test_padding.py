@@ -5,7 +5,6 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
-from moving import moving_case
 from rigs import draw_truth, make_case, make_gear
 from scipy import stats
 from structures import form_of
@@ -13,13 +12,8 @@ from structures import form_of
 from hdcal.data.priors import effect_priors
 from hdcal.inference.force_model.identifiability import linearise
 from hdcal.inference.force_model.likelihood import log_likelihood
-from hdcal.inference.force_model.padding import bucket_size, measured, repeat_last_row
+from hdcal.inference.force_model.padding import bucket_size
 from hdcal.inference.force_model.problem import build_problem
-from hdcal.motion.dynamic_problem import (
-    build_dynamic,
-    dynamic_site_priors,
-    predict_motion,
-)
 
 
 def test_few_lengths_hold_every_number_of_rows():
@@ -29,15 +23,6 @@ def test_few_lengths_hold_every_number_of_rows():
     assert sorted({*sizes}) == [size for size in lengths if size <= 3072]
     assert all(rows <= size for rows, size in enumerate(sizes))
     assert all(size < 1.5 * rows for rows, size in enumerate(sizes) if rows > 16)
-
-
-def test_the_last_row_is_repeated_and_not_measured():
-    tree = {"a": np.arange(5.0), "b": np.arange(10).reshape(5, 2)}
-    padded, real = repeat_last_row(tree, 16), np.asarray(measured(16, 5))
-    for name, array in tree.items():
-        assert padded[name].dtype == array.dtype
-        np.testing.assert_array_equal(padded[name][real], array)
-        np.testing.assert_array_equal(padded[name][~real], [array[-1]] * 11)
 
 
 @pytest.fixture(scope="module")
@@ -104,22 +89,3 @@ def test_derivatives_are_those_of_the_measured_rows(rounded):
     np.testing.assert_allclose(
         found.place[:4], values["run_offset"] / values["run_offset_sd"]
     )
-
-
-def test_a_moving_gear_padded_is_as_measured():
-    rows = 201
-    case = moving_case(0, rows=rows)
-    problem = build_dynamic(case, dynamic_site_priors(case, "ring"), "ring")
-    assert len(problem.time) == bucket_size(rows) > rows
-    cut = replace(
-        problem,
-        time=problem.time[:rows],
-        force=problem.force[:rows],
-        deformation=problem.deformation[:rows],
-    )
-    values = draw_truth(problem, jax.random.key(3))
-    move, density = jax.jit(predict_motion), jax.jit(log_likelihood)
-    motions = [np.asarray(move(one, values))[:rows] for one in (problem, cut)]
-    np.testing.assert_allclose(*motions, rtol=0, atol=1e-12)
-    densities = [float(density(one, values)) for one in (problem, cut)]
-    np.testing.assert_allclose(*densities, rtol=1e-11)

@@ -7,14 +7,12 @@ import pytest
 from posteriors import regressed
 from rigs import autoregression, cycles, make_records
 from scipy import stats
-from short import SHORT
 from slices import slice_of
 
 import hdcal
 from hdcal.calibration.calibration import calibration_of
 from hdcal.data.prior import Prior
 from hdcal.data.priors import rig_priors
-from hdcal.data.resources import datasets_folder
 from hdcal.inference.force_model.residual_shapes import (
     FALSE_ALARM,
     Correlated,
@@ -53,15 +51,6 @@ def correlated(rho: float, rng, rows: int = ROWS, run=None) -> np.ndarray:
 
 def rarely(alarms: int, count: int, share: float = FALSE_ALARM) -> bool:
     return stats.binomtest(alarms, count, share, "greater").pvalue > 1e-3
-
-
-# --- whitening ---
-
-
-def test_neighbours_are_of_one_run_on_one_specimen():
-    run, specimen = np.array([0, 1, 0, 1, 1, 0]), np.array([0, 0, 0, 0, 1, 1])
-    records = make_records(np.arange(6.0), run=run, specimen=specimen)
-    np.testing.assert_array_equal(previous_rows(records), [-1, -1, 0, 1, -1, -1])
 
 
 def test_whitened_noise_is_independent():
@@ -168,35 +157,6 @@ def test_a_known_correlation_is_generalised_least_squares():
     assert found["direction"].error == pytest.approx(error)
 
 
-@pytest.mark.thorough
-def test_the_article_s_data_bend_upwards():
-    case = hdcal.read_case(datasets_folder() / "xb1-100-80")
-    left = residuals(hdcal.calibrate(case, **SHORT))
-    assert [shape.name for shape in left.structure] == ["curvature"]
-    assert left.structure[0].coefficient > 0.0
-    assert left.structure[0].p_value < 1e-3
-
-
-@pytest.mark.thorough
-def test_thermal_demo_needs_its_effect():
-    case = hdcal.read_case(datasets_folder() / "thermal-demo")
-    without = hdcal.calibrate(case, **SHORT)
-    assert [s.name for s in residuals(without).structure] == ["temperature"]
-    effect = hdcal.calibrate(case, effects=["thermal_zero_drift"], **SHORT)
-    assert residuals(effect).structure == ()
-    truth = {
-        "K": 2.5,
-        "alpha": 3.2e-4,
-        "force_offset": 1.5,
-        "deformation_offset": 0.004,
-        "sigma": 0.4,
-        "thermal_zero_drift.slope": 0.12,
-    }
-    for name, value in truth.items():
-        low, high = np.quantile(effect.draws[name], [0.025, 0.975])
-        assert low < value < high, name
-
-
 def test_smoothing_the_deformation_leaves_no_shape_over_the_rows():
     rng, x = np.random.default_rng(1), np.linspace(0.0, 2.0, 400)
     readings = {
@@ -294,12 +254,6 @@ def test_a_slip_of_writing_is_named_by_its_reading():
         assert WILD not in faults(error, mixed=True)
         error[ROWS // 3] -= 60.0
         assert WILD not in faults(error)
-
-
-def test_noise_with_long_tails_is_seldom_a_slip():
-    rng = np.random.default_rng(9)
-    many = [WILD in faults(rng.standard_t(5, size=ROWS)) for _ in range(200)]
-    assert np.mean(many) <= 0.03
 
 
 def test_sizes_are_those_of_all_shapes_together():

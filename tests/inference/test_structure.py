@@ -12,10 +12,8 @@ from hdcal.inference.force_model import noise_form
 from hdcal.inference.force_model.noise_form import noise_grows, pilot_fit
 from hdcal.inference.force_model.structure import (
     NONE_SHOWN,
-    ModelStructure,
     decide_structure,
 )
-from hdcal.physics.effect import Noise, Rows, parameters
 from hdcal.physics.registry import EFFECTS
 
 ROWS = 200
@@ -51,12 +49,6 @@ def test_the_form_is_that_of_the_simulated_readings(bend: float, correlation: fl
     assert right >= 18
 
 
-def test_correlation_is_of_what_is_faster_than_the_loading():
-    # 200 rows of one ramp: errors may be correlated over 40 rows.
-    prior = case(0.0, 0.0, 0).gear.scale_priors["noise_correlation"]
-    assert prior.numbers == pytest.approx((0.0, np.exp(-1.0 / 40.0)))
-
-
 def test_a_bend_is_not_fitted_with_effects_or_few_rows():
     bent = case(20.0, 0.0, 0)
     assert decide_structure(bent).with_gap
@@ -82,14 +74,6 @@ def test_many_specimens_have_a_line_each():
     many = hdcal.read_case(table, gear=SPRING)
     assert pilot_fit(many.records).noise_sd == pytest.approx(1.0, rel=0.06)
     assert not decide_structure(many).with_gap
-
-
-@pytest.mark.thorough
-def test_a_posterior_keeps_its_structure():
-    posterior = hdcal.calibrate(case(0.0, 0.7, 0), warmup=300, draws=100)
-    assert posterior.structure == decide_structure(posterior.case)
-    assert isinstance(posterior.structure, ModelStructure)
-    assert posterior.structure.correlated and "noise_correlation" in posterior.draws
 
 
 X = np.linspace(0.02, 0.54, 60)
@@ -140,28 +124,9 @@ def test_wild_readings_do_not_hide_that_the_others_are_rounded(wild):
     assert decide_structure(rounded, (EFFECTS["outliers"],)).rounded
 
 
-def test_a_mixture_is_declared_as_one():
-    """Correlation is inferred of single normals only."""
-    rows = Rows(make_records(X), 0.0 * X, 0.0 * X + 205.0, X)
-    for name, effect in EFFECTS.items():
-        if effect.stage == "noise":
-            sizes = {n: about.typical for n, about in parameters(effect).items()}
-            noise = Noise(np.zeros(1), np.ones((1, 60)))
-            found = effect(**sizes).apply(noise, rows)
-            assert (len(found.log_weight) > 1) == effect.mixture, name
-
-
 def share_grown(noise_of, x=X, count: int = 150, **rows) -> float:
     cases = (case_of(noise_of(), x=x, **rows) for _ in range(count))
     return float(np.mean([noise_grows(one) for one in cases]))
-
-
-def test_noise_of_one_size_rarely_grows():
-    rng = np.random.default_rng(1)
-    for rows, most in ((14, 0.12), (120, 0.1)):
-        x = np.linspace(0.02, 0.54, rows)
-        assert share_grown(lambda n=rows: rng.normal(size=n), x, 300) < most
-    assert share_grown(lambda: 41.0 * X * rng.normal(size=60)) > 0.85
 
 
 def test_correlated_noise_of_one_size_rarely_grows(monkeypatch):
@@ -210,20 +175,8 @@ def test_what_a_loop_leaves_at_its_turns_does_not_grow(monkeypatch):
     assert grown() < 0.08
     assert grown(0.5) > 0.8
     # Where the loop is not fitted it passes for growth.
-    plain = noise_form.pilot_fit
-    monkeypatch.setattr(noise_form, "pilot_fit", lambda records, *_: plain(records))
-    assert grown() > 0.5
-
-
-def test_growth_that_the_range_cannot_show_is_none(monkeypatch):
-    """Noise in proportion to a deformation that hardly changes does not grow."""
-    rng = np.random.default_rng(4)
-
-    def grown() -> float:
-        return share_grown(lambda: (X + 0.02) * rng.normal(size=60), X + 10.0, 50)
-
-    assert grown() == 0.0
-    monkeypatch.setattr(noise_form, "_LEAST_GROWTH", 1.001)
+    plain = noise_form.base_model
+    monkeypatch.setattr(noise_form, "base_model", lambda records, _: plain(records))
     assert grown() > 0.5
 
 

@@ -1,7 +1,5 @@
 """Every public result shows what matters most of it in a notebook's cell."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -14,11 +12,9 @@ from posteriors import single
 import hdcal
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
-from hdcal.inference.force_model.residual_shapes import Structure
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = ["Bands", "Case", "Diagnosis", "Fleet", "Margin", "Posterior"]
-NAMES += ["Residuals", "Response"]
+NAMES = ["Bands", "Case", "Diagnosis", "Fleet", "Margin", "Posterior", "Response"]
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +26,6 @@ def results():
         "Margin": (hdcal.margin(posterior, 0.4), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
         "Posterior": (posterior, "per millimetre as read"),
-        "Residuals": (hdcal.residuals(posterior), "measured − fitted"),
         "Response": (
             hdcal.respond(still_posterior(), "step", points=21, draws=20),
             "The deformation reaches",
@@ -88,17 +83,6 @@ def test_pyplot_is_asked_where_no_axes_are_given(results):
         axes = results["Bands"][0].plot()
         assert axes.figure.number in pyplot.get_fignums()
         pyplot.close(axes.figure)
-
-
-def test_residuals_say_their_shapes(results):
-    left = results["Residuals"][0]
-    assert (left.structure, left.noise) == ((), ())
-    assert "have no shape" in repr(left)
-    bend = Structure("curvature", 0.001, 2.0, "They bend.")
-    noise = Structure("scatter", 0.001, 2.0, "They grow.")
-    shaped = replace(left, structure=(bend,), noise=(noise,))
-    assert "They bend." in repr(shaped)
-    assert all(one.words in shaped._repr_html_() for one in (bend, noise))
 
 
 def test_a_verdict_stands_for_its_models(results):

@@ -65,7 +65,7 @@ def test_check_shows_findings_segments_and_the_straight_part():
     assert answer["segments"] == {"loading": 80, "after the largest force": 40}
     assert answer["straight_part"]["whole"]
     labels = [mark.label for mark in found.charts()["readings"].panels[0].marks]
-    assert labels == ["loading", "left out: after the largest force"]
+    assert labels == ["", "left out: after the largest force"]
 
 
 def test_a_gear_with_a_negative_slope_can_be_left_out():

@@ -56,8 +56,6 @@ def written_posterior(
             rhat=1.0,
             ess_bulk=1000.0,
             ess_tail=1000.0,
-            prior_sensitivity=0.0,
-            likelihood_sensitivity=0.1,
             contraction=0.0 if name in BY_PRIOR else 0.9,
             driven_by="prior" if name in BY_PRIOR else "data",
         )

@@ -7,8 +7,18 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
-from hdcal.inference.force_model.likelihood import log_likelihood, log_prior
+from hdcal.inference.distributions import distribution
+from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.laplace import potential, values_at
+
+
+def log_prior(problem, values):
+    """Return the log prior of the named parameters, each in its native coordinate."""
+    total = 0.0
+    for name, prior in problem.priors.items():
+        if name in values and prior.family != "fixed":
+            total = total + distribution(prior, name).log_prob(values[name])
+    return total
 
 
 def base_places(rng, count: int = 8) -> dict[str, np.ndarray]:
@@ -17,7 +27,7 @@ def base_places(rng, count: int = 8) -> dict[str, np.ndarray]:
         "E0": 12.2 + 0.01 * rng.normal(size=count),
         "_KE0": 13.1 + 0.1 * rng.normal(size=count),
         "alpha": -8.0 + 0.1 * rng.normal(size=count),
-        "force_offset": rng.normal(size=count),
+        "_centre_force": 57.0 + rng.normal(size=count),
     }
 
 

@@ -39,14 +39,8 @@ from hdcal.physics.registry import EFFECTS
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
 _SHARE = f"{HeteroscedasticNoise.name}.share"
-_SHOWN = {
-    _SHARE: Prior(
-        "half_normal",
-        (0.2,),
-        "1",
-        "wide, as the readings scatter more at larger forces",
-    )
-}
+_GROWING = "wide, as the readings scatter more at larger forces"
+_SHOWN = {_SHARE: Prior("half_normal", (0.2,), "1", _GROWING)}
 # The constant part is then about this share of what a pilot fit leaves.
 _PART, _PART_LOG_SD = 0.3, 0.7
 _PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to grow"
@@ -55,11 +49,7 @@ _PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to 
 def choose_effects(
     names: Sequence[str], registry: Mapping[str, type[Effect]] = EFFECTS
 ) -> tuple[type[Effect], ...]:
-    """Look effects up by name.
-
-    Args:
-        names: of effects; each counts once.
-        registry: the library.
+    """Look effects up by name in a library; each counts once.
 
     Raises:
         InputError: a name is not in the library; the nearest one is suggested.
@@ -110,14 +100,14 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    asked, pilot = choose_effects(effects, registry), pilot_fit(case.records)
+    asked = choose_effects(effects, registry)
     check_effect_priors(case, registry)
     chosen, shipped = asked, effect_priors(case.gear.full_scale)
-    grows = adapt_noise and _may_grow(case, asked) and noise_grows(case, pilot)
+    grows = adapt_noise and _may_grow(case, asked) and noise_grows(case)
     if grows:
         chosen, shipped = (*asked, HeteroscedasticNoise), shipped | _SHOWN
-        case = _with_constant_part(case, pilot.noise_sd)
-    form = decide_structure(case, asked, with_gap, pilot)
+        case = _with_constant_part(case)
+    form = decide_structure(case, asked, with_gap)
     theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, structure=form)
@@ -159,7 +149,7 @@ def _may_grow(case: Case, effects: Sequence[type[Effect]]) -> bool:
     return not fixed and all(effect.stage != "noise" for effect in effects)
 
 
-def _with_constant_part(case: Case, noise_sd: float) -> Case:
+def _with_constant_part(case: Case) -> Case:
     """Return a case in which σ is the part of the noise that does not grow.
 
     Were it next to nothing, the least force that is possible would be a wall at which
@@ -168,7 +158,8 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
     gear, shipped = case.gear, rig_priors()["sigma"]
     if gear.priors["sigma"].source != shipped.source:
         return case
-    believed = Prior("lognormal", (_PART * noise_sd, _PART_LOG_SD), "N", _PART_SOURCE)
+    middle = _PART * pilot_fit(case.records).noise_sd
+    believed = Prior("lognormal", (middle, _PART_LOG_SD), "N", _PART_SOURCE)
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 

@@ -2,27 +2,22 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
-import jax
-import numpy as np
-from pydantic import Field, InstanceOf, computed_field
+from pydantic import Field, InstanceOf
 
 from hdcal.calibration.charts import calibration_chart, residual_chart
-from hdcal.calibration.residual_report import ResidualShape, residual_shapes
 from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
-from hdcal.exported import jit
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
 from hdcal.inference.force_model.residuals import WILD, Residuals, residuals
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.predict import default_bands
 from hdcal.prediction.bands.result import Bands
-from hdcal.prediction.forces import force_of, grid_records
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.charts.draws_charts import prior_chart
-from hdcal.report.item import Interval, Item, Words, quantity
+from hdcal.report.item import Interval, Item, Words
 from hdcal.report.posterior_result import (
     PARAMETER_NAMES,
     ParameterEstimate,
@@ -32,23 +27,24 @@ from hdcal.report.posterior_result import (
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]
-# Length of the secant as a share of the largest deformation: short compared with
-# what an effect changes, and long compared with the rounding of its corners.
-_SECANT = 0.02
 # Covariates whose absence leaves a question open.
 _WANTED = ("unloading", "specimen", "temperature")
 
 
-class Tangent(Item):
-    """The stiffness at the end of the tested range, effects included.
+class ResidualShape(Item):
+    """A shape of the residuals that noise would rarely have.
 
     Attributes:
-        at_mm: the largest tested deformation as read.
-        stiffness_N_per_mm: slope of the mean load there, on first loading.
+        name: what they depend on.
+        p_value: adjusted for the number of shapes tried.
+        size_N: root mean square of the shape.
+        words: one sentence.
     """
 
-    at_mm: float = quantity("largest tested deformation", "mm")
-    stiffness_N_per_mm: Interval = quantity("stiffness there", "N/mm")
+    name: str
+    p_value: Annotated[float, Field(ge=0.0, le=1.0)]
+    size_N: Annotated[float, Field(ge=0.0)]
+    words: Words
 
 
 class Calibration(PosteriorResult):
@@ -57,9 +53,8 @@ class Calibration(PosteriorResult):
     Attributes:
         parameters: by name, those that were fixed last.
         K_by_theory: from the one posterior by every theory; None of a spring.
-        residuals: their shapes that noise would rarely have.
+        residuals: their shapes that noise would rarely have, those of the noise last.
         effects: in the model.
-        tangent: stiffness at the largest tested deformation, where effects change it.
         with_gap: whether the model has a leftover discrepancy.
         specimens: of several, by label, the stiffness of each as read [N/mm].
         steps: names of what to do next, most urgent first.
@@ -77,23 +72,10 @@ class Calibration(PosteriorResult):
     )
     residuals: tuple[ResidualShape, ...]
     effects: tuple[str, ...]
-    tangent: Tangent | None
     with_gap: bool
     specimens: dict[str, Interval]
     steps: tuple[str, ...] = Field(exclude=True)
     left: InstanceOf[Residuals] = Field(exclude=True)
-
-    @computed_field
-    @property
-    def K_note(self) -> str:
-        """What K under the theory `article` means."""
-        return self.line("K_note")
-
-    @computed_field
-    @property
-    def next_steps(self) -> tuple[Words, ...]:
-        """What would make the answer better, most urgent first."""
-        return self.lines("next_steps")
 
     @property
     def part_of_curve(self) -> str:
@@ -143,27 +125,24 @@ class Calibration(PosteriorResult):
         posterior, left = self.posterior, self.left
         return {
             "calibration": calibration_chart(posterior, self.bands, left),
-            "residuals": residual_chart(left, posterior.case.run_labels),
+            "residuals": residual_chart(left),
             "priors": prior_chart(posterior),
         }
 
 
 def calibration_of(posterior: Posterior) -> Calibration:
-    """Return a calibration as a result.
-
-    Args:
-        posterior: from `calibrate`.
-    """
-    left = residuals(posterior)
-    fields = posterior_fields(posterior)
-    shapes = residual_shapes(left)
+    """Return a calibration as a result."""
+    left, fields = residuals(posterior), posterior_fields(posterior)
+    shapes = tuple(
+        ResidualShape(name=s.name, p_value=s.p_value, size_N=s.size_N, words=s.words)
+        for s in (*left.structure, *left.noise)
+    )
     fields["warnings"] += tuple(shape.words for shape in shapes)
     return Calibration(
         **fields,
         K_by_theory=K_by_theory(posterior),
         residuals=shapes,
         effects=tuple(effect.name for effect in posterior.effects),
-        tangent=tangent_stiffness(posterior),
         with_gap=bool(posterior.settings["with_gap"]),
         specimens=_specimens(posterior),
         steps=tuple(dict.fromkeys(_steps(posterior, left))),
@@ -171,39 +150,8 @@ def calibration_of(posterior: Posterior) -> Calibration:
     )
 
 
-def tangent_stiffness(posterior: Posterior) -> Tangent | None:
-    """Return the stiffness at the largest tested deformation, effects included.
-
-    K and the stiffness of the straight model leave effects out: behind the onset of a
-    second contact a gear is stiffer. None where the model has no effect that changes
-    the stiffness at once.
-    """
-    acting = [e for e in posterior.effects if e.stage in ("deformation", "force")]
-    if not any(effect.instantaneous for effect in acting):
-        return None
-    case = posterior.case
-    deformation = np.asarray(case.records.deformation)
-    largest = float(deformation[np.argmax(np.abs(deformation))])
-    before = (1.0 - _SECANT) * largest
-    warm = np.full(2, case.gear.reference_temperature)
-    rows = grid_records(np.array([before, largest]), warm, np.ones(2), 0.0)
-    forces = np.asarray(_loads(posterior.problem, posterior.draws, rows))
-    slopes = np.diff(forces, axis=1)[:, 0] / (largest - before)
-    return Tangent(at_mm=largest, stiffness_N_per_mm=Interval.of(slopes))
-
-
-@jit
-def _loads(problem, values, rows):
-    return jax.vmap(lambda one: force_of(problem, one, rows, quantity="load")[0])(
-        values
-    )
-
-
 def summarise(posterior: Posterior) -> dict:
     """Return a calibration as plain data: the content of summary.json.
-
-    Args:
-        posterior: from `calibrate`.
 
     Raises:
         InputError: `posterior` is not a calibration.

@@ -1,6 +1,6 @@
 """Charts of a calibration: readings with bands, and residuals."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -8,15 +8,10 @@ from hdcal.calibration.check.charts import left_out
 from hdcal.data.loading import movement_words
 from hdcal.inference.force_model.residuals import Residuals
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.bands.charts import (
-    band_marks,
-    branch_marks,
-    branches,
-)
+from hdcal.prediction.bands.charts import band_marks, branch_marks, branches
 from hdcal.prediction.bands.result import Bands
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
-    CYCLE,
     GREY,
     INK,
     Chart,
@@ -28,7 +23,7 @@ from hdcal.report.charts.chart_spec import (
 )
 from hdcal.screening.result import DROPPED, OUTSIDE
 
-_MOST_COLUMNS, _MOST_GROUPS = 3, 6
+_MOST_COLUMNS = 3
 # What was left out and is part of the curve; a wild reading would flatten the picture.
 _PARTS_OF_CURVE = (DROPPED, OUTSIDE)
 # Marker of each direction, and its colour where colours show nothing else.
@@ -48,7 +43,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
     levels = np.unique(bands.temperature_C)
     colours = ascending_colours(len(levels))
     nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
-    distance = distance_from_model(bands, left)
+    distance = _distance_from_model(bands, left)
     reach = _reach(bands, distance)
     top, panels, found = [*band_marks(bands)], [], posterior.case.screening
     if found is not None:
@@ -85,7 +80,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
     return Chart(panels=[first, *panels], columns=columns, share_x=True, share_y=True)
 
 
-def distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
+def _distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
     """Return the distance of each reading from the force model alone [N]."""
     distance = left.residual.copy()
     gap = bands.with_gap_median_N - bands.physics_median_N
@@ -114,28 +109,18 @@ def _readings(
     left: Residuals,
     y: np.ndarray,
     here: np.ndarray,
-    colour: str,
+    colour: str = "",
     label: str = "",
     x: np.ndarray | None = None,
 ) -> Iterator[Points]:
-    """Yield some rows as points, each direction with its marker.
-
-    Args:
-        left: residuals.
-        y: values of all rows.
-        here: which rows.
-        colour: of the points; empty where it shows the direction.
-        label: of the points; empty without a legend.
-        x: places of all rows, by default the deformation.
-    """
+    """Yield some rows as points over the deformation or `x`, each direction apart."""
     x = left.deformation if x is None else x
     words = movement_words(left.deformation, left.units.displacement)
     for sense, (marker, usual) in _MARKERS.items():
         rows = here & (left.direction == sense)
         if rows.any():
-            text = f"{label}, {words[sense]}" if label else ""
             yield Points(
-                label=text,
+                label=f"{label}, {words[sense]}" if label else "",
                 x=x[rows],
                 y=y[rows],
                 colour=colour or usual,
@@ -143,54 +128,27 @@ def _readings(
             )
 
 
-def residual_chart(left: Residuals, runs: Sequence[str] = ()) -> Chart:
-    """Return standardised residuals over deformation, order and temperature.
-
-    Args:
-        left: residuals.
-        runs: labels of the runs.
-    """
-    units = left.units
-    y, order = left.standardised, np.arange(1.0, len(left.residual) + 1.0)
-    axis = f"{units.displacement} as read [{units.displacement_unit}]"
-    places = {axis: left.deformation, "row of the data": order}
+def residual_chart(left: Residuals) -> Chart:
+    """Return standardised residuals over deformation, order and temperature."""
+    units, y, every = left.units, left.standardised, np.full(len(left.residual), True)
+    places = {
+        f"{units.displacement} as read [{units.displacement_unit}]": left.deformation,
+        "row of the data": np.arange(1.0, len(every) + 1.0),
+    }
     if np.ptp(left.temperature) > 0.0:
         places["temperature [°C]"] = left.temperature
     reach = max(3.0, 1.1 * float(np.max(np.abs(y))))
-    panels = []
-    for axis, x in places.items():
-        points = [
-            mark
-            for label, here, colour in _groups(left, runs)
-            for mark in _readings(left, y, here, colour, label, x)
-        ]
-        panels.append(
-            Panel(
-                x=axis,
-                y="(measured − fit) / sd",
-                marks=[Span(low=-2.0, high=2.0, label="±2 sd"), Rule(at=0.0), *points],
-                y_limits=(-reach, reach),
-                wide=True,
-                height=2.5,
-                legend_beside=True,
-            )
+    frame = [Span(low=-2.0, high=2.0, label="±2 sd"), Rule(at=0.0)]
+    panels = [
+        Panel(
+            x=axis,
+            y="(measured − fit) / sd",
+            marks=[*frame, *_readings(left, y, every, label="measured", x=x)],
+            y_limits=(-reach, reach),
+            wide=True,
+            height=2.5,
+            legend_beside=True,
         )
+        for axis, x in places.items()
+    ]
     return Chart(panels=panels)
-
-
-def _groups(
-    left: Residuals, runs: Sequence[str]
-) -> Iterator[tuple[str, np.ndarray, str]]:
-    """Yield label, rows and colour by temperature, or else by run."""
-    warmth, labels = np.round(left.temperature, 1), np.unique(left.run)
-    levels = np.unique(warmth)
-    if 1 < len(levels) <= _MOST_GROUPS:
-        colours = ascending_colours(len(levels))
-        for level, colour in zip(levels, colours, strict=True):
-            yield f"{level:g} °C", warmth == level, colour
-    elif len(levels) == 1 and 1 < len(labels) <= _MOST_GROUPS:
-        for run, colour in zip(labels, CYCLE, strict=False):
-            name = runs[run] if len(runs) else run
-            yield f"run {name}", left.run == run, colour
-    else:
-        yield "measured", np.ones(len(warmth), bool), ""

@@ -62,7 +62,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
 
     with console.wrong as wrong:
         effects = settings["effects"]
-        for name in ("with_gap", "constant_noise", "effects") if dynamic else ():
+        for name in ("with_gap", "effects") if dynamic else ():
             if settings.pop(name):
                 words = "does not go with --dynamic, which has no such model"
                 wrong.append(Finding(name, words, "Leave it out"))
@@ -79,7 +79,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
 
             if takes_straight_part(case):
                 case = read_given(console, data, **{**reading, "range": STRAIGHT})
-        # Said now, not after minutes of sampling.
+        # Refused now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"
         console.reserve_folder(out, force)
@@ -91,7 +91,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     from hdcal.calibration.calibrate import calibrate as sample
     from hdcal.calibration.calibration import calibration_of
 
-    settings["adapt_noise"] = not settings.pop("constant_noise")
     with progress_bar() as progress:
         posterior = sample(case, progress=progress, **settings)
     found = calibration_of(posterior)

@@ -14,15 +14,10 @@ from hdcal.physics.registry import EFFECTS
 def check_names(
     names: Sequence[str], registry: Mapping[str, type[Effect]], parameter: str
 ) -> None:
-    """Check that effects are in the library.
-
-    Args:
-        names: of effects.
-        registry: the library.
-        parameter: that the names were given as, for the finding.
+    """Check that effects, given as some parameter, are in the library.
 
     Raises:
-        InputError: a name is not; the nearest one is suggested.
+        InputError: one is not; the nearest one is suggested.
     """
     with Findings() as findings:
         for name in names:

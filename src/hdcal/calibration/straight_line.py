@@ -34,9 +34,6 @@ def robust_line(records: Records) -> RobustLine | None:
 
     Zeros of runs and a linear dependence on temperature are fitted too. The loss is
     Huber's, smooth (`soft_l1`): wild readings count little.
-
-    Args:
-        records: the rows.
     """
     from scipy.optimize import least_squares
 
@@ -105,9 +102,6 @@ def takes_straight_part(case: Case) -> bool:
     """Return whether the stiffness of a curve is that of its straight part.
 
     It is not where that part has the stiffness of a straight line through all readings.
-
-    Args:
-        case: records with their screening.
     """
     found, part, x = case.screening, _part(case), np.asarray(case.records.deformation)
     if found is None or found.working_range or part is None or not np.ptp(x):

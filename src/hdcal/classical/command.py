@@ -29,8 +29,8 @@ from hdcal.cli.options import case_options, json_option, out_option, read_given
 def fit(console: Console, degrees, at, out, force, **given):
     """Fit polynomials of force over deformation to DATA by least squares.
 
-    The coefficients are those of polyfit, with standard errors, confidence intervals,
-    and tests of whether the curve suits the data.
+    The coefficients are those of polyfit, with standard errors and confidence
+    intervals.
     """
     from hdcal.classical.fit import fit as fit_case
 

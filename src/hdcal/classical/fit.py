@@ -11,11 +11,10 @@ import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 from scipy import stats
 
-from hdcal.classical.charts import fit_chart
 from hdcal.data.case import Case, require_case, require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.report.charts.chart_spec import Chart
+from hdcal.report.charts.chart_spec import CYCLE, Band, Chart, Line, Mark, Panel, Points
 from hdcal.report.item import INTERVAL, Draws, Interval, Item, Words, quantity
 from hdcal.report.result import Result
 
@@ -32,14 +31,6 @@ class Coefficient(Item):
     hi: float
 
 
-class LackOfFit(Item):
-    """F test against the scatter of repeated rows."""
-
-    F: float
-    dof: tuple[int, int]
-    p_value: float
-
-
 class Polynomial(Item):
     """A fitted polynomial; forces in N, deformations in mm, all as read.
 
@@ -48,7 +39,6 @@ class Polynomial(Item):
         polyfit_order: all coefficients, highest power first, as polyval takes them.
         r2: about the mean force, also without intercept; None for constant forces.
         aicc: of Hurvich and Tsai (1989); None for exact or too few rows.
-        lack_of_fit: None where no conditions were repeated.
         covariance: of the coefficients.
     """
 
@@ -61,7 +51,6 @@ class Polynomial(Item):
     dof: int
     r2: float | None
     aicc: float | None
-    lack_of_fit: LackOfFit | None
     force_N: Interval | None = quantity("force", "N", default=None)
     reading_N: Interval | None = quantity("next reading", "N", default=None)
     covariance: Draws
@@ -108,8 +97,23 @@ class Fits(Result):
         return self.lines("notes")
 
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return readings, curves and residuals."""
-        return {"fit": fit_chart(self.case.records, self.fits)}
+        """Return readings and curves with their confidence bands."""
+        x = np.asarray(self.case.records.deformation)
+        grid, marks = np.linspace(min(0.0, x.min()), max(0.0, x.max()), 200), []
+        for place, one in enumerate(self.fits):
+            force, half, _ = one.curve(grid)
+            name, hue = one.model, CYCLE[place % len(CYCLE)]
+            dash = "solid" if one.intercept else "dashed"
+            low, high = force - half, force + half
+            marks += [
+                Band(label=name, x=grid, low=low, high=high, colour=hue),
+                Line(label=name, x=grid, y=force, colour=hue, dash=dash),
+            ]
+        force = np.asarray(self.case.records.force)
+        points: Mark = Points(label="readings", x=x, y=force)
+        x_axis, y_axis = "deformation as read [mm]", "force as read [N]"
+        panel = Panel(x=x_axis, y=y_axis, marks=[*marks, points])
+        return {"fit": Chart(panels=[panel])}
 
 
 def fit(
@@ -145,10 +149,8 @@ def fit(
             words = f"the deformations do not determine degree {degree}"
             remedy = "Use a lower degree, or measure at more deformations"
             raise InputError([Finding(case.name, words, remedy)])
-    alike = np.column_stack([x, np.round(records.temperature), records.sense])
-    repeats = np.unique(alike, axis=0, return_inverse=True)[1].ravel()
     fits = [
-        fit_polynomial(x, y, degree, intercept, repeats)
+        fit_polynomial(x, y, degree, intercept)
         for degree in dict.fromkeys(degrees)
         for intercept in (True, False)
     ]
@@ -167,9 +169,9 @@ def _columns(x: np.ndarray, degree: int, intercept: bool) -> np.ndarray:
 
 
 def fit_polynomial(
-    x: np.ndarray, y: np.ndarray, degree: int, intercept: bool, repeats: np.ndarray
+    x: np.ndarray, y: np.ndarray, degree: int, intercept: bool
 ) -> Polynomial:
-    """Fit a polynomial to rows; those with the same number in `repeats` are repeats."""
+    """Fit a polynomial to forces y [N] at deformations x [mm]."""
     scale, powers = float(np.max(np.abs(x))), np.arange(not intercept, degree + 1)
     design = _columns(x / scale, degree, intercept)
     inverse = np.linalg.pinv(design)
@@ -197,7 +199,6 @@ def fit_polynomial(
         dof=dof,
         r2=1.0 - squares / variation if variation else None,
         aicc=_aicc(rows, squares, unknowns + 1),
-        lack_of_fit=_lack_of_fit(y, repeats, unknowns, squares),
         covariance=covariance,
     )
 
@@ -211,15 +212,3 @@ def _aicc(rows: int, squares: float, free: int) -> float | None:
         return None
     deviance = rows * (np.log(2.0 * np.pi * squares / rows) + 1.0)
     return deviance + 2.0 * free * rows / (rows - free - 1)
-
-
-def _lack_of_fit(y, repeats, unknowns: int, squares: float) -> LackOfFit | None:
-    count = np.bincount(repeats)
-    error = y - (np.bincount(repeats, y) / count)[repeats]
-    extra, free = len(count) - unknowns, len(y) - len(count)
-    below = float(error @ error)
-    if extra < 1 or free < 1 or below <= 0.0:
-        return None
-    ratio = max(squares - below, 0.0) / extra / (below / free)
-    p_value = float(stats.f.sf(ratio, extra, free))
-    return LackOfFit(F=ratio, dof=(extra, free), p_value=p_value)

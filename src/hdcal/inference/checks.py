@@ -1,7 +1,6 @@
 """Whether a posterior may be used, and what its reader must know.
 
-A failed check fails the result. A warning or a note leaves it usable and says what
-the reader must know.
+A failed check fails the result; a warning or a note must be read.
 """
 
 from collections.abc import Mapping
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, MAX_TREE_DEPTH, Mixing
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import frozen
 from hdcal.inference.force_model.serial_correlation import CORRELATION
 
@@ -22,13 +21,12 @@ INDEPENDENT = "neighbouring readings err independently"
 PLAUSIBLE = "prior and data agree"
 NOISY = "the noise is what such rigs have"
 MIN_BFMI = 0.3
-MAX_SATURATED = 0.01
 # Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.
 COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
 # Parameters that are ordinarily zero: that is no bound that cuts an answer off.
-ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
+_ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation that is reported where it is larger with 95 % probability [-].
 _REPORTED_CORRELATION = 0.1
 # A correlation from which intervals are too narrow where readings determine a mean no
@@ -38,13 +36,7 @@ _STRONG_CORRELATION, _FEW_EFFECTIVE = 0.5, 26.0
 
 @dataclass(frozen=True)
 class Check:
-    """One check and what it found.
-
-    Attributes:
-        name: the property that is checked.
-        outcome: failed = do not use the result; warning and note = read this.
-        words: one sentence for people.
-    """
+    """The property that is checked, its outcome, and a sentence about it."""
 
     name: str
     outcome: Literal["passed", "note", "warning", "failed"]
@@ -56,15 +48,14 @@ def _check(name: str, passed: bool, words: str) -> Check:
 
 
 def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
-    """Return the checks on the sampler: any of them failed fails the result."""
+    """Return the checks on NUTS: any of them failed fails the result."""
     from arviz_stats.base.array import array_stats
 
-    # NaN, which no check passes, where the energy stands still.
+    # NaN, which no check passes, where the energy does not change.
     with np.errstate(all="ignore"):
         energy = np.asarray(array_stats.bfmi(draws.statistics["energy"]))
-    diverging, steps = draws.statistics["diverging"], draws.statistics["n_steps"]
+    diverging = draws.statistics["diverging"]
     divergent = int(diverging.sum())
-    saturated = float((steps >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
         *mixing_checks(mixed, draws.shape[0]),
         _check(
@@ -76,12 +67,6 @@ def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check,
             "no divergent trajectories",
             divergent == 0,
             f"{divergent} of {diverging.size} draws diverged, allowed 0",
-        ),
-        _check(
-            "trajectories end by themselves (tree depth)",
-            saturated <= MAX_SATURATED,
-            f"{saturated:.1%} of trajectories were cut off, allowed "
-            f"{MAX_SATURATED:.0%}",
         ),
     )
 
@@ -118,13 +103,16 @@ def correlation_check(
     if CORRELATION not in draws:
         words = f"a correlation of neighbours is not inferred for these data: {reason}"
         return Check(INDEPENDENT, "note", words)
-    least, *ends, middle = np.quantile(draws[CORRELATION], [0.05, 0.025, 0.975, 0.5])
+    least, low, middle, high = np.quantile(
+        draws[CORRELATION], [0.05, 0.025, 0.5, 0.975]
+    )
     if least < _REPORTED_CORRELATION:
-        return Check(
-            INDEPENDENT, "passed", "the readings show no correlation of neighbours"
-        )
-    span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
-    words = f"the errors of neighbouring readings have a correlation of {span}"
+        words = "the readings show no correlation of neighbours"
+        return Check(INDEPENDENT, "passed", words)
+    words = (
+        "the errors of neighbouring readings have a correlation of "
+        f"{middle:.2f} ({low:.2f} to {high:.2f}, 95 %)"
+    )
     # 1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|: the variance of a mean.
     effective = (rows - (rows - 2) * middle) / (1.0 + middle)
     if middle < _STRONG_CORRELATION or effective > _FEW_EFFECTIVE:
@@ -133,7 +121,7 @@ def correlation_check(
         INDEPENDENT,
         "warning",
         f"{words}. Every interval allows for it, but these readings are equivalent to "
-        f"some {effective:.0f} independent ones, and 95 % intervals hold the truth "
+        f"some {effective:.0f} independent ones, and 95 % intervals contain the truth "
         "less often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read "
         "longer or repeat",
     )
@@ -150,12 +138,12 @@ def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> C
         "{load}; every interval allows for it"
     )
     if unasked:
-        words += ". --constant-noise, or adapt_noise=False, keeps it of one size"
+        words += ". A prior of heteroscedastic_noise.share, fixed at zero, turns it off"
     return Check(name, "note", words)
 
 
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
-    """Fail a result whose noise [N] is too small for Sheppard's correction.
+    """Fail a result whose noise is too small for Sheppard's correction.
 
     Args:
         step: rounding step [N].
@@ -187,12 +175,11 @@ def conflict_check(
             above[parameter] = median > prior.median()
     if not far:
         return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
+    # A wrong unit would show in the stiffness too.
     if {*far} <= {"sigma", CORRELATION} and all(above.values()):
-        # A wrong unit shows in the stiffness too.
         name = NOISY
         remedy = "A loop, a bend or a drift that the model lacks counts as noise here"
     elif all("." in parameter for parameter in far):
-        # A wrong unit shows in more than in parameters of effects.
         name = "prior and effects agree"
         remedy = "Where the rig explains it, state a prior for it"
     else:
@@ -207,13 +194,10 @@ def conflict_check(
 
 def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) -> Check:
     """Warn of posteriors that are pressed against an end of their prior."""
-    name = "no parameter at a bound"
-    piled = []
-    for parameter, values in draws.items():
-        if parameter in ORDINARY_AT_ZERO:
-            continue
+    name, piled = "no parameter at a bound", []
+    for parameter in (n for n in draws if n not in _ORDINARY_AT_ZERO):
         low, high = frozen(priors[parameter], parameter).support()
-        flat = values.reshape(-1)
+        flat = draws[parameter].reshape(-1)
         for end, distance in ((low, flat - low), (high, high - flat)):
             # A density that does not fall towards the end leaves a tenth of its
             # 95 % reach a share of at least a tenth; an inner one leaves none.

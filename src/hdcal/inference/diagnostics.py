@@ -1,27 +1,20 @@
-"""How well each parameter was sampled, and whether data or prior decide it."""
+"""How well each quantity was sampled, and whether data or prior decide it."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import softmax
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import moments
 
 # Limits of chains that have mixed: the largest R-hat, the smallest ESS of each chain.
 MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
-# Doublings of a trajectory.
-MAX_TREE_DEPTH = 10
 # Probability of ArviZ' default interval, for the ends of which the tail ESS is.
 _TAIL = 0.89
-# Share of the prior variance that the data must remove to decide a parameter; the
-# second value where power-scaling finds the likelihood weak.
-MIN_CONTRACTION, CLEAR_CONTRACTION = 0.75, 0.95
-# Power-scaling sensitivity from which a prior or a likelihood matters, and the change
-# of the power, up and down.
-SENSITIVE, _POWER = 0.05, 0.01
+# Share of the prior variance that the data must remove to decide a parameter.
+MIN_CONTRACTION = 0.75
 
 Driver = Literal["data", "prior"]
 _SMALLEST = np.finfo(float).tiny
@@ -48,14 +41,10 @@ class Convergence(Mixing):
 
     Attributes:
         contraction: 1 − var(posterior)/var(prior), of a lognormal prior in logarithms.
-        prior_sensitivity: change of the posterior when the priors are power-scaled.
-        likelihood_sensitivity: likewise for the likelihood.
         driven_by: whether the data or the prior decide the parameter.
     """
 
     contraction: float
-    prior_sensitivity: float
-    likelihood_sensitivity: float
     driven_by: Driver
 
 
@@ -88,10 +77,7 @@ def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
 
 
 def pareto_shape(weight: np.ndarray) -> float:
-    """Return the Pareto k of importance weights; infinite if few are above zero.
-
-    Args:
-        weight: of independent draws, up to a factor, shape (n,).
+    """Return the Pareto k of importance weights (n,); infinite if few are above zero.
 
     Raises:
         ValueError: the largest weights are equal.
@@ -106,59 +92,21 @@ def pareto_shape(weight: np.ndarray) -> float:
 
 
 def diagnose_parameters(
-    draws: Mapping[str, np.ndarray],
-    priors: Mapping[str, Prior],
-    log_prior: np.ndarray,
-    log_likelihood: np.ndarray,
+    draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> dict[str, Convergence]:
     """Return the convergence of each scalar parameter, and what decides it."""
-    to_prior = power_sensitivity(draws, log_prior)
-    to_data = power_sensitivity(draws, log_likelihood)
-    diagnoses = {}
+    found = {}
     for name, mixed in mixing(draws).items():
-        contraction = _contraction(draws[name], priors[name], name)
-        weak = to_data[name] < SENSITIVE < to_prior[name]
-        enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
-        diagnoses[name] = Convergence(
-            **asdict(mixed),
-            contraction=contraction,
-            prior_sensitivity=to_prior[name],
-            likelihood_sensitivity=to_data[name],
-            driven_by="data" if contraction >= enough else "prior",
-        )
-    return diagnoses
+        share = _contraction(draws[name], priors[name], name)
+        driver: Driver = "data" if share >= MIN_CONTRACTION else "prior"
+        found[name] = Convergence(**asdict(mixed), contraction=share, driven_by=driver)
+    return found
 
 
 def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
-    """Return the share of the prior's variance that the data removed.
-
-    A lognormal prior is compared in logarithms, in which its width is the same
-    everywhere.
-    """
+    """Return the share of the prior's variance that the data removed."""
     if prior.family == "lognormal":
+        # In logarithms the width of the prior is the same everywhere.
         logarithm, sd = np.log(np.maximum(draws, _SMALLEST)), float(prior.numbers[1])
         return float(1.0 - logarithm.var() / sd**2)
     return float(1.0 - draws.var() / moments(prior, name)[1] ** 2)
-
-
-def power_sensitivity(
-    draws: Mapping[str, np.ndarray], log_part: np.ndarray
-) -> dict[str, float]:
-    """Return how much each parameter changes with the power of prior or likelihood.
-
-    The weights are not Pareto-smoothed: so near to one they have no tail.
-    """
-    from arviz_stats.base.array import array_stats
-
-    weights = {
-        "lower_w": softmax(-_POWER * log_part),
-        "upper_w": softmax(_POWER * log_part),
-        "lower_alpha": 1.0 - _POWER,
-        "upper_alpha": 1.0 + _POWER,
-    }
-    # The distance is 0/0 where all draws are equal.
-    with np.errstate(all="ignore"):
-        return {
-            name: np.asarray(array_stats.power_scale_sense(values, **weights)).item()
-            for name, values in draws.items()
-        }

@@ -84,6 +84,13 @@ def _frozen(
     return found, (float(found.mean()), float(found.std()))
 
 
+def quantiles(prior: Prior, count: int, name: str = "") -> np.ndarray:
+    """Return quantiles of a prior that stand for it with equal weights."""
+    if prior.family == "fixed":
+        return np.array([float(prior.numbers[0])])
+    return np.asarray(frozen(prior, name).ppf((np.arange(count) + 0.5) / count))
+
+
 def sample_prior(
     prior: Prior, name: str, rng: np.random.Generator, count: int
 ) -> np.ndarray:

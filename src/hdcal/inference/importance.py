@@ -70,12 +70,7 @@ class Proposals(NamedTuple):
 
 
 class ImportanceDraws(NamedTuple):
-    """Resampled draws, and how well proposals covered the posterior.
-
-    Attributes:
-        values: by site name, each of shape (chain, draw); chains are exchangeable.
-        shape: Pareto k of the largest weights.
-    """
+    """Resampled draws by site name, (chain, draw) each, and Pareto k of the weights."""
 
     values: dict[str, np.ndarray]
     shape: float
@@ -90,16 +85,15 @@ def sample_by_importance(
     draws: int,
     progress: Progress | None = None,
 ) -> ImportanceDraws | None:
-    """Draw from a posterior with few parameters, in its whitened coordinates.
+    """Draw from a posterior with few parameters; None where proposals cover it badly.
 
     The effective sample size of the proposals is at least half the number of draws.
-    None is returned where proposals cover the posterior badly.
 
     Args:
         problem: the inference problem, with every parameter among its coordinates.
         whitening: its mode and curvature, from `laplace.fit`.
         seed: the same one gives the same draws.
-        chains: groups of draws.
+        chains: groups of draws, which are exchangeable.
         draws: kept of each group.
         progress: called with (densities computed, densities in all).
     """

@@ -60,8 +60,8 @@ def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
 def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening:
     """Find the posterior mode and its curvature.
 
-    The mode only shapes the sampler's coordinates: a poor one costs speed, never
-    correctness, because NUTS samples the exact density in any coordinates.
+    A poor mode costs speed, never correctness: NUTS samples the exact density in any
+    coordinates.
 
     Args:
         problem: the inference problem.

@@ -12,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from hdcal.data.case import Case
-from hdcal.inference.posterior import HYPOTHESIS, Posterior
+from hdcal.inference.posterior import HYPOTHESIS, Library, Posterior
 from hdcal.inference.posterior_file import (
     CALIBRATION,
     content,
@@ -20,12 +20,10 @@ from hdcal.inference.posterior_file import (
     not_a_posterior,
     read_tree,
 )
-from hdcal.physics.effect import Effect
 
 # Hypotheses that name no effect.
 NONE, UNKNOWN = "none", "unknown"
 _WEIGHT, _LEFT_OUT = "probability", "left_out"
-Library = Mapping[str, type[Effect]]
 
 
 @dataclass(frozen=True)
@@ -89,12 +87,7 @@ class ModelAverage:
 
     @classmethod
     def load(cls, path: Path | str, effects: Library | None = None) -> "ModelAverage":
-        """Read the models of a diagnosis.
-
-        Raises:
-            InputError: as `Posterior.load`.
-            NotUsable: the diagnosis failed.
-        """
+        """Read the models of a diagnosis; errors as of `Posterior.load`."""
         file = file_of(path)
         return cls.from_tree(read_tree(file), file, effects)
 
@@ -127,8 +120,7 @@ def load_models(
         kinds: further kinds of posteriors that may be read.
 
     Raises:
-        InputError: as `Posterior.load`.
-        NotUsable: the diagnosis failed.
+        InputError, NotUsable: as of `Posterior.load`.
     """
     file = file_of(path)
     tree = read_tree(file)

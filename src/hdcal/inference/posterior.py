@@ -110,17 +110,8 @@ class Posterior(Shown):
         """Median of each site over all draws, in code units."""
         return {name: np.median(v, axis=0) for name, v in self.draws.items()}
 
-    @cached_property
-    def effective_priors(self) -> Mapping[str, Prior]:
-        """The priors, that of the force zero given how the mountings differ."""
-        return self.problem.priors_given(self.median)
-
     def require_usable(self) -> None:
-        """Raise when nothing may be derived from this posterior.
-
-        Raises:
-            NotUsable: with the reasons.
-        """
+        """Raise `NotUsable`, with the reasons, when a check failed."""
         if not self.usable:
             words = "this calibration failed its checks and must not be used"
             raise NotUsable(f"{words}: {'; '.join(self.reasons)}")
@@ -161,6 +152,7 @@ class Posterior(Shown):
         Raises:
             InputError: the file is missing, damaged, changed, of several models or
                 from another version, or names an effect that the library lacks.
+            NotUsable: the folder is of a diagnosis that failed.
         """
         file = file_of(path)
         return cls.from_tree(read_tree(file), file, effects)

@@ -19,20 +19,14 @@ _LARGEST_FILE = 1 << 32
 
 
 class Kind(NamedTuple):
-    """A kind of posterior file.
-
-    Attributes:
-        format: name and version of its format.
-        words: its content.
-        again: how it is made anew.
-    """
+    """Format and version of a posterior file, its content, and how to remake it."""
 
     format: str
     words: str
     again: str
 
 
-CALIBRATION = Kind("hdcal.posterior/2", "of a calibration", "calibrate again")
+CALIBRATION = Kind("hdcal.posterior/3", "of a calibration", "calibrate again")
 FLEET = Kind("hdcal.fleet-posterior/2", "of a fleet", "run hdcal fleet again")
 
 
@@ -77,7 +71,7 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
     try:
         tree = xr.load_datatree(path, engine="h5netcdf")
     except FileNotFoundError as error:
-        raise InputError([_missing(path)]) from error
+        raise _missing(path) from error
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
@@ -99,10 +93,7 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
 
 
 def digest(tree: xr.DataTree) -> str:
-    """Return a SHA-256 of all arrays and group attributes.
-
-    It detects accidental changes and is no signature.
-    """
+    """Return a SHA-256 of all arrays and group attributes; it is no signature."""
     whole = hashlib.sha256()
     for node in sorted(tree.subtree, key=lambda node: node.path):
         attributes = {n: v for n, v in node.attrs.items() if n != DIGEST}
@@ -130,18 +121,13 @@ def _kind(written: object) -> Kind | None:
     return next((kind for kind in kinds if kind.format.startswith(f"{name}/")), None)
 
 
-def _missing(path: Path) -> Finding:
-    """Return the finding for a missing file.
-
-    Raises:
-        NotUsable: the folder is of a diagnosis that failed.
-    """
+def _missing(path: Path) -> InputError | NotUsable:
+    """Return the error for a file that is not there, as of a failed diagnosis."""
     verdict = {}
     with suppress(OSError, ValueError):
         verdict = json.loads((path.parent / "verdict.json").read_bytes())
     if verdict.get("status") == "failed":
         reasons = "; ".join(map(str, verdict.get("reasons", ())))
-        raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
-    return Finding(
-        str(path), "there is no such file", "Name the folder of a calibration"
-    )
+        return NotUsable(f"this diagnosis failed and must not be used: {reasons}")
+    remedy = "Name the folder of a calibration"
+    return InputError([Finding(str(path), "there is no such file", remedy)])

@@ -24,7 +24,7 @@ _AXES = {
     "deformation": OVER_ROWS,
 }
 # Columns of the records that are not observed.
-COVARIATES = {
+_COVARIATES = {
     "deformation": "mm",
     "temperature": "degC",
     "time": "s",
@@ -78,13 +78,13 @@ def data_groups(
     units: Quantities = FORCE,
 ) -> dict[str, xr.Dataset]:
     """Return the groups of the rows: what the model explains, and the other columns."""
-    columns = {name: np.asarray(getattr(records, name)) for name in COVARIATES}
-    explained = {name: np.asarray(getattr(records, name)) for name in observed}
-    codes = units_in(units, {**COVARIATES, "force": "N"})
-    return {
-        "observed_data": dataset(explained, OVER_ROWS, units=codes),
-        "constant_data": dataset(columns, OVER_ROWS, units=codes),
-    }
+    codes = units_in(units, {**_COVARIATES, "force": "N"})
+
+    def group(names: Iterable[str]) -> xr.Dataset:
+        columns = {name: np.asarray(getattr(records, name)) for name in names}
+        return dataset(columns, OVER_ROWS, units=codes)
+
+    return {"observed_data": group(observed), "constant_data": group(_COVARIATES)}
 
 
 def units_in(units: Quantities, codes: Mapping[str, str]) -> dict[str, str]:
@@ -93,11 +93,7 @@ def units_in(units: Quantities, codes: Mapping[str, str]) -> dict[str, str]:
 
 
 def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
-    """Return a group of a tree.
-
-    Raises:
-        KeyError: there is none.
-    """
+    """Return a group of a tree; `KeyError` if there is none."""
     return tree.children[name].to_dataset(inherit=False)
 
 
@@ -149,7 +145,7 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     gear["geometry"] = Geometry(**{n: nan if v is None else v for n, v in sizes})
     gear["full_scale"] = FullScale(**gear["full_scale"])
     columns = group_of(tree, "constant_data")
-    rows = {name: columns[name].values for name in COVARIATES}
+    rows = {name: columns[name].values for name in _COVARIATES}
     rows["force"] = group_of(tree, "observed_data")["force"].values
     return Case(
         gear=Gear(**gear),

@@ -16,7 +16,7 @@ from numpyro.infer.hmc import hmc
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.exported import jit
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_TREE_DEPTH, have_mixed
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.force_model.marginal import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
@@ -62,11 +62,6 @@ class Draws:
         """Number of chains, and of draws of each."""
         return self.statistics["energy"].shape
 
-    @property
-    def diverged(self) -> bool:
-        """Whether any trajectory diverged."""
-        return bool(self.statistics["diverging"].any())
-
     @cached_property
     def median(self) -> dict[str, np.ndarray]:
         """Median of each parameter over all draws."""
@@ -83,7 +78,7 @@ def sample(
     draws: int = 1000,
     progress: Progress | None = None,
 ) -> Draws:
-    """Draw from the posterior.
+    """Draw from the posterior; the same seed gives the same draws.
 
     A run with divergent trajectories is discarded and repeated with shorter steps. A
     run whose chains have not mixed is extended, to at most four times its length.
@@ -91,22 +86,24 @@ def sample(
     Args:
         problem: the inference problem.
         whitening: coordinates from `laplace.fit`.
-        seed: the same one gives the same draws.
+        seed: of `jax.random.key`.
         chains: independent chains, one after the other in each stretch.
         warmup: iterations of adaptation per chain, discarded.
         draws: iterations kept per chain, or a multiple of them.
         progress: called after every stretch.
     """
-    begin = partial(_Run, problem, whitening, seed, chains, warmup, progress)
-    *longer, shortest = TARGET_ACCEPTANCE
-    for target in longer:
-        run = begin(target)
-        run.advance(draws, stop_if_diverging=True)
-        if not run.diverged and not (found := _extended(run, draws)).diverged:
-            return found
-    run = begin(shortest)
-    run.advance(draws)
-    return _extended(run, draws)
+    found = None
+    for target in TARGET_ACCEPTANCE:
+        run = _Run(problem, whitening, seed, chains, warmup, progress, target)
+        is_last = target == TARGET_ACCEPTANCE[-1]
+        run.advance(draws, stop_if_diverging=not is_last)
+        if run.diverged and not is_last:
+            continue
+        found = _extended(run, draws)
+        if not found.statistics["diverging"].any():
+            break
+    assert found is not None
+    return found
 
 
 def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
@@ -128,7 +125,8 @@ def _extended(run: "_Run", draws: int) -> Draws:
         values = found.values.items()
         varying = {n: v for n, v in values if v.ndim == 2 and np.ptp(v) > 0.0}
         may_be_longer = _ENOUGH * ESS_PER_CHAIN <= found.shape[1] < _LONGEST * draws
-        if not may_be_longer or found.diverged or have_mixed(varying):
+        diverged = found.statistics["diverging"].any()
+        if not may_be_longer or diverged or have_mixed(varying):
             return found
         run.advance(draws)
 
@@ -148,12 +146,7 @@ class _Run:
         self._done, self._kept = 0, []
 
     def advance(self, draws: int, *, stop_if_diverging: bool = False) -> None:
-        """Draw so many more from each chain, after its warm-up.
-
-        Args:
-            draws: their number.
-            stop_if_diverging: stop after the first stretch with a divergence.
-        """
+        """Draw so many more from each chain, after its warm-up."""
         warmup, total = self._warmup, max(self._done, self._warmup) + draws
         while self._done < total:
             # Stretches end with the warm-up, for few lengths.
@@ -196,7 +189,6 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
         init,
         num_warmup=warmup,
         target_accept_prob=target,
-        max_tree_depth=MAX_TREE_DEPTH,
         trajectory_length=None,  # pyright: ignore[reportArgumentType]
     )
     return start, step

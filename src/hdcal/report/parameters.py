@@ -27,8 +27,6 @@ class ParameterEstimate(Quantity):
         ess_bulk: effective draws for the centre.
         ess_tail: effective draws for the interval's ends.
         contraction: share of the prior's variance that the data removed.
-        prior_sensitivity: to power-scaling of the priors.
-        likelihood_sensitivity: to power-scaling of the likelihood.
         driven_by: whether the data or the prior decide it.
     """
 
@@ -36,8 +34,6 @@ class ParameterEstimate(Quantity):
     ess_bulk: float
     ess_tail: float
     contraction: float = Field(json_schema_extra={"maximum": 1})
-    prior_sensitivity: float
-    likelihood_sensitivity: float
     driven_by: Driver
 
 
@@ -59,15 +55,7 @@ def _code_unit(posterior: Posterior, name: str) -> tuple[str, float]:
 
 _NONE = math.nan
 # Of a parameter that was not sampled, because the gear file fixes it.
-_FIXED = Convergence(
-    rhat=_NONE,
-    ess_bulk=_NONE,
-    ess_tail=_NONE,
-    contraction=0.0,
-    prior_sensitivity=_NONE,
-    likelihood_sensitivity=_NONE,
-    driven_by="prior",
-)
+_FIXED = Convergence(_NONE, _NONE, _NONE, contraction=0.0, driven_by="prior")
 
 
 def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:

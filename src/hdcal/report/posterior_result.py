@@ -8,7 +8,7 @@ from pydantic import Field, InstanceOf
 
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION
+from hdcal.inference.diagnostics import MIN_CONTRACTION
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
 from hdcal.report.item import INTERVAL, Count, Digest, Interval, Item, Words, quantity
@@ -99,9 +99,9 @@ class PosteriorResult(Result):
         return {n: one for n, one in self.parameters.items() if n not in defined}
 
     @property
-    def contraction_limits(self) -> tuple[float, float]:
-        """Contractions from which data drive a parameter."""
-        return MIN_CONTRACTION, CLEAR_CONTRACTION
+    def least_contraction(self) -> float:
+        """Contraction from which data drive a parameter."""
+        return MIN_CONTRACTION
 
     @property
     def data_facts(self) -> list[tuple[str, str]]:

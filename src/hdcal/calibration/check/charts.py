@@ -1,53 +1,25 @@
-"""Chart of the readings of a case, with the segments of the record in colour."""
+"""Chart of the readings of a case, with the rows that were left out as crosses."""
 
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.report.charts.axes import displacement_axis
-from hdcal.report.charts.chart_spec import (
-    CYCLE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    RED,
-    SKY,
-    YELLOW,
-    Chart,
-    Panel,
-    Points,
-    drawn_rows,
-)
+from hdcal.report.charts.axes import displacement_axis, load_axis
+from hdcal.report.charts.chart_spec import CYCLE, Chart, Panel, Points, drawn_rows
 from hdcal.screening.result import REPEATED, SEGMENTS, Screening
 
-# Of the segments of a record; runs and specimens have the colours of the cycle.
-_COLOURS = dict(
-    zip(
-        SEGMENTS,
-        (CYCLE[0], ORANGE, GREEN, PURPLE, RED, YELLOW, SKY, GREY, GREY),
-        strict=True,
-    )
-)
 # A row that repeats the one before would hide it.
 _DRAWN = [place for place in range(len(SEGMENTS)) if place != REPEATED]
 
 
 def readings_chart(case: Case) -> Chart:
-    """Return force over deformation, with rows that were left out as crosses.
-
-    Each specimen has a colour, or else each run; of one run each segment.
-    """
-    found = case.screening
-    several = max(len(case.specimen_labels), len(case.run_labels)) > 1
-    marks = [*(_members(case) if several or found is None else _kept(found))]
-    panel = Panel(
-        x=displacement_axis(case),
-        y=f"{case.units.load} as read [{case.units.load_unit}]",
-        marks=[*marks, *([] if found is None else left_out(found))],
-        title=f"{case.name}: readings",
-    )
+    """Return force over deformation; each specimen has a colour, or else each run."""
+    marks = [*_members(case)]
+    if case.screening is not None:
+        marks += left_out(case.screening)
+    x, y = displacement_axis(case), load_axis(case.units, f"{case.units.load} as read")
+    panel = Panel(x=x, y=y, marks=marks, title=f"{case.name}: readings")
     return Chart(panels=[panel])
 
 
@@ -72,29 +44,16 @@ def _members(case: Case) -> Iterator[Points]:
         )
 
 
-def _kept(found: Screening) -> Iterator[Points]:
-    yield from _segments(found, found.kept, "o", "")
-
-
 def left_out(found: Screening, segments: Iterable[int] = _DRAWN) -> Iterator[Points]:
-    """Yield the rows that were left out, as crosses."""
-    rows = ~found.kept & np.isin(found.segment, [*segments])
-    yield from _segments(found, rows, "X", "left out: ")
-
-
-def _segments(
-    found: Screening, rows: np.ndarray, marker: str, words: str
-) -> Iterator[Points]:
-    """Yield some rows, those of each segment in its colour."""
-    some = np.flatnonzero(rows)
+    """Yield the rows that were left out, as crosses, each segment in its colour."""
+    some = np.flatnonzero(~found.kept & np.isin(found.segment, [*segments]))
     some = some[drawn_rows(found.force[some])]
     for segment in np.unique(found.segment[some]):
         these = some[found.segment[some] == segment]
-        name = SEGMENTS[segment]
         yield Points(
-            label=f"{words}{name}",
+            label=f"left out: {SEGMENTS[segment]}",
             x=found.deformation[these],
             y=found.force[these],
-            colour=_COLOURS[name],
-            marker=marker,
+            colour=CYCLE[(segment + 1) % len(CYCLE)],
+            marker="X",
         )

@@ -7,22 +7,20 @@ import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
-from hdcal.calibration.check.screened import Screened, StraightRange, screened
 from hdcal.calibration.straight_line import takes_straight_part
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_file.schema import certificates_in
 from hdcal.data.loading import loading
-from hdcal.data.records import Array, less_run_means
+from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.report.charts.chart_spec import Chart
-from hdcal.report.item import Count, Digest, EffectName, Item, Words, quantity
+from hdcal.report.item import Count, Digest, EffectName, Item, Words
 from hdcal.report.result import Result
-from hdcal.report.sentences import rendered
 from hdcal.report.words import UNITS
-from hdcal.screening.result import HOLDING, LOADING, SEGMENTS
+from hdcal.screening.result import HOLDING, LOADING, SEGMENTS, Screening
 
 # Prior standard deviations of log K that contain 99.7 % of it.
 _FAR = 3.0
@@ -48,7 +46,6 @@ class StatedError(Item):
     standard_uncertainty: float
     unit: str
     certificate: str
-    words: str
 
 
 class RowsByMovement(Item):
@@ -81,52 +78,69 @@ class TestableEffects(Item):
     not_testable: dict[str, tuple[str, ...]]
 
 
-class Specimen(Item):
-    """One of several specimens.
+class ScreenedFinding(Item, from_attributes=True):
+    """A finding of the screening: what it is, where, how large, and what was done."""
 
-    Attributes:
-        stiffness_N_per_mm: slope of parallel lines through its runs, NaN where the
-            deformation does not change.
-    """
+    kind: str
+    rows: str = Field(validation_alias="where")
+    row_count: Count = Field(validation_alias="count")
+    size: float
+    unit: str
+    action: str
+    words: Words
 
-    name: str = quantity("specimen")
-    rows: Count
-    runs: Count
-    stiffness_N_per_mm: float = quantity("stiffness as read", "N/mm")
+
+class StraightRange(Item):
+    """The longest straight part of the curve, and whether that is all of it."""
+
+    deformation_mm: Ends
+    stiffness_N_per_mm: float
+    standard_error_N_per_mm: float
+    whole: bool
+
+
+class Screened(Item):
+    """What the screening found, with the number of rows of each segment."""
+
+    findings: tuple[ScreenedFinding, ...]
+    segments: dict[str, Count]
+    working_range: str
+    straight_part: StraightRange | None
 
 
 class CaseCheck(Result):
     """What was read of a case.
 
     Attributes:
-        specimens: empty unless there are several.
         screening: None where the rows are not those of a file.
         case: what was read.
         implausible_K: slope of the readings as K, with the ends of its prior, if it
             lies outside.
-        each_effect: whether the text lists what each effect lacks.
     """
 
     template = "calibration/check/report.md.j2"
-    table = "specimens"
+    table = "findings"
 
     format: Literal["hdcal.check/1"] = "hdcal.check/1"
     name: str = Field(serialization_alias="case")
     gear: CheckedGear
     certificates: tuple[StatedError, ...]
     data: CheckedData
-    specimens: tuple[Specimen, ...]
     effects: TestableEffects
     screening: Screened | None
     case: Annotated[InstanceOf[Case], Field(exclude=True)]
     implausible_K: tuple[float, float, float] | None = Field(exclude=True)
-    each_effect: bool = Field(exclude=True)
 
     @computed_field
     @property
     def notes(self) -> tuple[Words, ...]:
         """Doubts, assumptions and remarks."""
         return self.lines("notes")
+
+    @property
+    def findings(self) -> tuple[ScreenedFinding, ...]:
+        """What the screening found."""
+        return self.screening.findings if self.screening else ()
 
     @property
     def left_out(self) -> dict[str, int]:
@@ -145,24 +159,13 @@ class CaseCheck(Result):
         """Whether `calibrate` takes the longest straight part only."""
         return takes_straight_part(self.case)
 
-    @property
-    def stiffness_range(self) -> float:
-        """Difference of the largest and the smallest stiffness of a specimen [N/mm]."""
-        slopes = np.array([one.stiffness_N_per_mm for one in self.specimens])
-        return float(np.ptp(slopes[np.isfinite(slopes)])) if slopes.size else 0.0
-
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the readings."""
         return {"readings": readings_chart(self.case)}
 
 
-def check(case: Case, *, each_effect: bool = False) -> CaseCheck:
-    """Return what was read of a case.
-
-    Args:
-        case: from `read_case`.
-        each_effect: list in the text what each effect lacks.
-    """
+def check(case: Case) -> CaseCheck:
+    """Return what was read of a case."""
     gear, records = case.gear, case.records
     lacking = {
         name: tuple(sorted(effect.needs - records.known))
@@ -180,15 +183,13 @@ def check(case: Case, *, each_effect: bool = False) -> CaseCheck:
         ),
         certificates=_certificates(case),
         data=_data(case),
-        specimens=_specimens(case) if len(case.specimen_labels) > 1 else (),
         effects=TestableEffects(
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
         ),
-        screening=screened(case.screening),
+        screening=_screened(case.screening),
         case=case,
         implausible_K=_implausible_K(case),
-        each_effect=each_effect,
         part="part" if gear.theory == SPRING else "gear",
         units=case.units,
     )
@@ -204,7 +205,6 @@ def _certificates(case: Case) -> tuple[StatedError, ...]:
             standard_uncertainty=float(stated[name].numbers[1]) * UNITS[name][1],
             unit=UNITS[name][0],
             certificate=stated[name].source,
-            words=rendered(CaseCheck.template, name, {}, plain=True).strip(),
         )
         for name, prior in priors.items()
         if is_stated(prior)
@@ -250,18 +250,19 @@ def _ends(values: Array) -> Ends:
     return float(np.min(values)), float(np.max(values))
 
 
-def _specimens(case: Case) -> tuple[Specimen, ...]:
-    records = case.records
-    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
-    x, y = np.asarray(records.deformation), np.asarray(records.force)
-    first = np.unique(run, return_index=True)[1]
-    # Counted from its first reading, a deformation that is held is exactly zero.
-    x, y = (less_run_means(v, run) for v in (x - x[first][run], y))
-    xx, xy = np.bincount(specimen, x * x), np.bincount(specimen, x * y)
-    slopes = np.divide(xy, xx, out=np.full(len(xx), np.nan), where=xx > 0.0)
-    rows, runs = np.bincount(specimen), np.bincount(specimen[first])
-    columns = case.specimen_labels, rows.tolist(), runs.tolist(), slopes.tolist()
-    return tuple(
-        Specimen(name=name, rows=rows, runs=runs, stiffness_N_per_mm=slope)
-        for name, rows, runs, slope in zip(*columns, strict=True)
+def _screened(found: Screening | None) -> Screened | None:
+    if found is None:
+        return None
+    part, rows = found.straight, np.bincount(found.segment, minlength=len(SEGMENTS))
+    straight = part and StraightRange(
+        deformation_mm=(part.low, part.high),
+        stiffness_N_per_mm=part.slope,
+        standard_error_N_per_mm=part.slope_sd,
+        whole=part.whole,
+    )
+    return Screened(
+        findings=tuple(map(ScreenedFinding.model_validate, found.observations)),
+        segments={n: int(k) for n, k in zip(SEGMENTS, rows, strict=True) if k},
+        working_range=found.working_range,
+        straight_part=straight,
     )

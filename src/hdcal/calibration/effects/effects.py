@@ -1,11 +1,9 @@
 """The library of effects: what each one means, what it needs and its priors."""
 
-from collections.abc import Mapping
 from typing import Literal
 
-from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
-from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.item import EffectName, Item, Words
 from hdcal.report.result import Result
@@ -13,15 +11,9 @@ from hdcal.report.words import prior_words
 
 
 class ListedParameter(Item):
-    """A parameter of an effect.
+    """A parameter of an effect, with its shipped prior in words, if there is one.
 
-    Attributes:
-        name: of the parameter.
-        unit: of its values.
-        meaning: in one line.
-        null: value at which the effect vanishes, if it is an amplitude.
-        prior: shipped prior in words; None where there is none.
-        source: of the prior.
+    `null` is the value at which the effect vanishes, of an amplitude.
     """
 
     name: str
@@ -55,33 +47,28 @@ class Effects(Result):
 
 def effects() -> Effects:
     """Return every effect of the library with its parameters."""
-    priors = effect_priors()
-    listed = (_listed(name, effect, priors) for name, effect in EFFECTS.items())
-    return Effects(effects=tuple(listed))
-
-
-def _listed(
-    name: str, effect: type[Effect], priors: Mapping[str, Prior]
-) -> ListedEffect:
-    found = []
-    for field, declared in parameters(effect).items():
-        site = f"{name}.{field}"
-        prior = priors.get(site)
-        found.append(
-            ListedParameter(
+    priors, listed = effect_priors(), []
+    for name, effect in EFFECTS.items():
+        found = []
+        for field, spec in parameters(effect).items():
+            site = f"{name}.{field}"
+            prior = priors.get(site)
+            one = ListedParameter(
                 name=field,
-                unit=declared.unit,
-                meaning=declared.meaning,
-                null=declared.null,
+                unit=spec.unit,
+                meaning=spec.meaning,
+                null=spec.null,
                 prior=prior_words(site, prior) if prior else None,
                 source=prior.source if prior else None,
             )
+            found.append(one)
+        one = ListedEffect(
+            name=name,
+            stage=effect.stage,
+            family=effect.family,
+            needs=tuple(sorted(effect.needs)),
+            meaning=(effect.__doc__ or "").strip().split("\n")[0],
+            parameters=tuple(found),
         )
-    return ListedEffect(
-        name=name,
-        stage=effect.stage,
-        family=effect.family,
-        needs=tuple(sorted(effect.needs)),
-        meaning=(effect.__doc__ or "").strip().split("\n")[0],
-        parameters=tuple(found),
-    )
+        listed.append(one)
+    return Effects(effects=tuple(listed))

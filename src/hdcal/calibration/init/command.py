@@ -1,8 +1,6 @@
 """`hdcal init`: ask for what a gear file needs, and write a case folder."""
 
-import math
 import os
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +11,7 @@ from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.options import column_option, json_option, sheet_option
 from hdcal.data.theory_names import READINGS
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.errors import Finding, InputError
 
 # Parameter -> its key in the gear file, its option, what is asked, the usual answer.
 _ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
@@ -34,28 +32,7 @@ _ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
         20.0,
     ),
 }
-# A comma that can only be a decimal one; in 1,000 it may be none.
-_DECIMAL_COMMA = re.compile(r"\s*[-+]?(0,\d+|[1-9]\d*,(\d{1,2}|\d{4,}))\s*")
-
-
-class _Number(click.ParamType):
-    """A number with a decimal point; of a comma it says what to write."""
-
-    name = "number"
-
-    def convert(self, value, param, ctx):
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if math.isfinite(number):
-            return number
-        point = _DECIMAL_COMMA.fullmatch(str(value)) is not None
-        right = value.strip().replace(",", ".") if point else "it like 20.5"
-        self.fail(f"{quoted(str(value))} is no number: write {right}", param, ctx)
-
-
-_KIND = dict.fromkeys(_ASKED, _Number()) | {
+_KIND = dict.fromkeys(_ASKED, click.FLOAT) | {
     "material": click.STRING,
     "reading": click.Choice(READINGS),
 }
@@ -154,9 +131,6 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
     if there := [name for name in files if (folder / name).exists()]:
         words = f"holds {' and '.join(there)} already"
         raise InputError([Finding(str(folder), words, "Name another folder")])
-    if not folder.parent.is_dir():
-        words = "its parent folder does not exist"
-        raise InputError([Finding(str(folder), words, "Make that first")])
     try:
         folder.mkdir(exist_ok=True)
         for name, content in files.items():

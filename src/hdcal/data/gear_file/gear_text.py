@@ -4,15 +4,6 @@ import json
 from collections.abc import Iterator, Mapping
 
 _LONGEST = 200
-_LEFT_OUT = """\
-# theory = "spring" asks for the stiffness alone. For a gear leave it out and state
-# its sizes instead:
-# wall_thickness_mm = 0.68
-# radius_mm = 40.0             # to the neutral surface
-# length_mm = 70.0
-# material = "steel"           # or the name of another one, or a file
-# and below [measurement], which way it is read:
-# deformation = "radial"       # or "diametral", which makes K twice as large"""
 
 
 def gear_text(
@@ -37,6 +28,4 @@ def _table(name: str, rows: Mapping[str, str | float]) -> Iterator[str]:
             # Of a file, whose name may hold anything; the schema takes so many letters.
             value = "".join(c for c in str(value) if c.isprintable())[:_LONGEST]
         yield f"{key} = {json.dumps(value, ensure_ascii=False)}"
-    if rows.get("theory") == "spring":
-        yield _LEFT_OUT
     yield ""

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import jax
 import numpy as np
@@ -16,7 +15,10 @@ from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
 from hdcal.inference.force_model.identifiability import identification_checks
-from hdcal.inference.force_model.likelihood import densities, pointwise_log_likelihood
+from hdcal.inference.force_model.likelihood import (
+    log_likelihoods,
+    pointwise_log_likelihood,
+)
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.serial_correlation import previous_rows
@@ -28,7 +30,6 @@ from hdcal.versions import versions
 _PRIOR_DRAWS = 2000
 # The log likelihood of every row and draw is not kept above this many numbers.
 MOST_LOG_LIKELIHOODS = 8_000_000
-TOTAL = "total"
 # Units of what follows from the parameters, and of members.
 _UNITS = {
     "stiffness": "N/mm",
@@ -61,23 +62,21 @@ def assemble(
         problem: inference problem.
         draws: from the sampler.
         seed: of the prior draws.
-        log_likelihood: by observed column, (chain, draw, row); none for many rows.
+        log_likelihood: by observed column, (chain, draw, row); none for many rows, of
+            which the total is kept.
         sensitivities: of the mean reading to each parameter, in noise sds.
         mixed: further quantities whose chains must have mixed, (chain, draw) each.
         checks: further ones.
         observed: columns of the records that the model explains.
     """
     values = draws.values
-    log_prior, total = map(np.asarray, densities(problem, values))
-    # Draws are compared with the priors given how the mountings differ.
-    problem = replace(problem, priors=problem.priors_given(draws.median))
     sampled = {
-        name: problem.priors[name]
+        name: prior
         for name, prior in priors.items()
         if name in values and prior.family != "fixed"
     }
     scalars = {name: values[name] for name in sampled}
-    diagnoses = diagnose_parameters(scalars, sampled, log_prior, total)
+    diagnoses = diagnose_parameters(scalars, sampled)
     rng = np.random.default_rng(seed)
     prior_draws = {
         name: sample_prior(prior, name, rng, _PRIOR_DRAWS)[None]
@@ -86,20 +85,21 @@ def assemble(
     units = _UNITS | {name: prior.unit for name, prior in priors.items() if prior.unit}
     units = units_in(case.units, units)
     labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
+    if not log_likelihood:
+        log_likelihood = {"total": np.asarray(log_likelihoods(problem, values))}
     groups = {
         "posterior": dataset(values, units=units, labels=labels),
         "prior": dataset(prior_draws, units=units),
         "sample_stats": dataset(draws.statistics),
         **data_groups(case.records, observed, case.units),
-        # The total has members integrated out, where they were.
-        "log_likelihood": dataset(log_likelihood or {TOTAL: total}),
+        "log_likelihood": dataset(log_likelihood),
     }
     checks = (
         *sampling_checks(draws, diagnoses | mixing(mixed)),
         *checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
-        *identification_checks(sensitivities, problem.priors),
+        *identification_checks(sensitivities, priors),
     )
     return xr.DataTree.from_dict(groups), diagnoses, checks
 

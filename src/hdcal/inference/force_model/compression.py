@@ -86,9 +86,7 @@ def _factors(table: np.ndarray, group: np.ndarray, size: int) -> np.ndarray:
     """Return the triangular factor of each group's rows, zeros below few rows."""
     width = table.shape[1]
     factors = np.zeros((size, width, width))
-    count = np.bincount(group, minlength=size)
-    table = table[np.argsort(group, kind="stable")] if size > 1 else table
-    for index, rows in enumerate(np.split(table, np.cumsum(count)[:-1])):
-        factor = np.linalg.qr(rows, mode="r")
+    for index in range(size):
+        factor = np.linalg.qr(table[group == index], mode="r")
         factors[index, : len(factor)] = factor
     return factors

@@ -1,4 +1,4 @@
-"""Sensitivities of the readings: standard errors, and what the prior decides."""
+"""Sensitivities of the readings: what they determine, and what the prior decides."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,12 +13,11 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.checks import Check, listed
-from hdcal.inference.distributions import frozen, moments
+from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
 from hdcal.inference.force_model.values import predict_rows
-from hdcal.physics.effect import parameters
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
@@ -104,54 +103,6 @@ def _derivatives(problem: Problem, values, records: Records, columns, *, names):
     return sd, slopes
 
 
-def resolved_units(
-    problem: Problem, records: Records, base_columns: np.ndarray, noise_sd: float
-) -> dict[str, float]:
-    """Return the standard error of each half-normal amplitude near its null.
-
-    By linear least squares with the base model, and never more than the prior sd.
-
-    Args:
-        problem: structure and priors.
-        records: the rows, not padded.
-        base_columns: of the base model, shape (n, 4).
-        noise_sd: of a pilot fit [N].
-    """
-    widest = {
-        name: float(prior.numbers[0])
-        for name, prior in problem.priors.items()
-        if "." in name and prior.family == "half_normal"
-    }
-    if not widest:
-        return {}
-    slope = np.polyfit(records.deformation, records.force, 1)[0]
-    unit_slope = problem.unit_stiffness * problem.reading.radial_per_read
-    values = {"K": slope / unit_slope, "E0": 1.0, "sigma": noise_sd}
-    values |= dict.fromkeys(("alpha", "force_offset", "deformation_offset"), 0.0)
-    for effect in problem.effects:
-        for field, spec in parameters(effect).items():
-            name = f"{effect.name}.{field}"
-            prior = problem.priors[name]
-            if name in widest:
-                # A tenth of the prior sd: at zero itself an effect may have no slope.
-                values[name] = widest[name] / 10.0
-            elif spec.null is not None:
-                values[name] = spec.null
-            else:
-                fixed = prior.family == "fixed"
-                values[name] = prior.numbers[0] if fixed else frozen(prior).median()
-    padded, rows = pad_records(records), len(base_columns)
-    _, slopes = _derivatives(problem, values, padded, None, names=tuple(widest))
-    units = dict(widest)
-    for name, most in widest.items():
-        slope = np.asarray(slopes[name])[:rows]
-        fitted = base_columns @ np.linalg.lstsq(base_columns, slope, rcond=None)[0]
-        length = float(np.linalg.norm(slope - fitted))
-        if length > 0.0 and noise_sd > 0.0:
-            units[name] = min(most, noise_sd / length)
-    return units
-
-
 def identification_checks(
     sensitivities: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> tuple[Check, ...]:
@@ -163,9 +114,15 @@ def identification_checks(
     # In units of its prior sd every parameter has prior precision one.
     scaled = {n: s * moments(priors[n], n)[1] for n, s in sensitivities.items()}
     length = {name: float(np.linalg.norm(column)) for name, column in scaled.items()}
-    unseen = [name for name in scaled if length[name] < _NO_EFFECT]
+    changes = "every parameter changes the readings"
+    apart = "parameters are distinguishable"
+    notes = [
+        Check(changes, "note", f"{n}: does not change these readings, prior-dominated")
+        for n in scaled
+        if length[n] < _NO_EFFECT
+    ] or [Check(changes, "passed", "each one changes the predicted readings")]
     flat = [
-        f"{name} hardly changes the readings: its prior decides it"
+        f"{name} hardly changes the readings: prior-dominated"
         for name in scaled
         if _NO_EFFECT <= length[name] < 1.0
     ]
@@ -174,16 +131,9 @@ def identification_checks(
         if set(names) == {"K", "E0"}:
             words = "their product can, and with the prior of E0 that determines K"
         flat.append(f"{listed(names)} cannot be distinguished by these data; {words}")
-    seen, apart = (
-        "every parameter changes the readings",
-        "parameters are distinguishable",
-    )
-    none = Check(seen, "passed", "each one changes the predicted readings")
-    every = Check(apart, "passed", "no direction is left to the priors")
-    without = "does not change these readings, the prior decides it"
-    no_effect = [Check(seen, "note", f"{name}: {without}") for name in unseen]
-    directions = [Check(apart, "note", sentence) for sentence in flat]
-    return *(no_effect or [none]), *(directions or [every])
+    found = [Check(apart, "note", words) for words in flat]
+    none = Check(apart, "passed", "no direction is left to the priors")
+    return *notes, *(found or [none])
 
 
 def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:

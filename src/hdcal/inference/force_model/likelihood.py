@@ -1,4 +1,4 @@
-"""Likelihood of a problem's readings, and the log prior of its parameters."""
+"""Likelihood of the readings of a problem."""
 
 from functools import partial, singledispatch
 
@@ -12,7 +12,6 @@ from scipy import special
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference.distributions import distribution
 from hdcal.inference.force_model.marginal import linear_part
 from hdcal.inference.force_model.padding import measured
 from hdcal.inference.force_model.problem import Problem
@@ -47,16 +46,15 @@ def log_interval(low, high):
 
 
 def log_probability(force, mean, noise: Noise, step, *, rounded: bool):
-    """Return the log probability of each reading, shape (n,).
+    """Return the log probability of each reading [log 1/N], shape (n,).
 
     Args:
         force: as read [N].
         mean: expected reading [N].
         noise: mixture of normals before rounding [N].
         step: rounding step q of the reading [N].
-        rounded: whether a reading y stands for the interval y ± q/2 (then the
-            result is a probability divided by q, so that it stays a density in N)
-            or for the number itself.
+        rounded: whether a reading y stands for the interval y ± q/2, whose probability
+            is divided by q, or for the number itself.
     """
     error = (force - mean) / noise.sd
     if rounded:
@@ -111,21 +109,8 @@ def _(problem: Problem, values: Values) -> Float[Array, ""]:
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 
-def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
-    """Return the log prior of the named parameters, each in its native coordinate."""
-    total = jnp.zeros(())
-    for name, prior in problem.priors_given(values).items():
-        if name in values and prior.family != "fixed":
-            total = total + distribution(prior, name).log_prob(values[name])
-    return total
-
-
 @jit
-def densities(problem: Sampled, draws: Values):
-    """Return log prior and log likelihood of each draw, (chain, draw) each."""
-
-    def both(one):
-        return log_prior(problem, one), log_likelihood(problem, one)
-
+def log_likelihoods(problem: Sampled, draws: Values) -> Float[Array, "chain draw"]:
+    """Return the log likelihood of all data by draw."""
     # One draw after the other: all rows of thousands of draws would fill the memory.
-    return jax.vmap(partial(jax.lax.map, both))(draws)
+    return jax.vmap(partial(jax.lax.map, partial(log_likelihood, problem)))(draws)

@@ -78,19 +78,13 @@ class Linear(eqx.Module):
 
 
 class _Rows(NamedTuple):
-    """Rows in noise sds, measured or compressed.
+    """Rows in noise sds: residual, columns of unit members by kind, and log scale.
 
-    Attributes:
-        residual: reading less mean, shape (r,).
-        labels: index of the member of each kind, shape (r,) each.
-        columns: contribution of a unit member of each kind to its rows.
-        gap: columns of the discrepancy, or None.
-        log_scale: Σ log sd √(2π) over the measured rows.
+    Runs and specimens are given as one column and the label of each row.
     """
 
     residual: Float[Array, " r"]
-    labels: dict[str, Int[Array, " r"]]
-    columns: dict[str, Float[Array, " r"]]
+    columns: dict[str, tuple[Float[Array, " r"], Int[Array, " r"]]]
     gap: Float[Array, "r m"] | None
     log_scale: Float[Array, ""]
 
@@ -111,7 +105,8 @@ def linear_part(problem: Problem, values: Values) -> Linear:
             assert rows.gap is not None
             design.append(rows.gap @ root)
         else:
-            design.append(rows.columns[kind][:, None] * root[rows.labels[kind]])
+            column, label = rows.columns[kind]
+            design.append(column[:, None] * root[label])
     return Linear(rows.residual, jnp.hstack(design), rows.log_scale)
 
 
@@ -148,8 +143,7 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
     volume = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
     return _Rows(
         white(records.force - mean),
-        {"run": jnp.asarray(records.run)},
-        {"run": white(jnp.ones_like(sd))},
+        {"run": (white(jnp.ones_like(sd)), jnp.asarray(records.run))},
         None if problem.columns is None else white(problem.columns),
         volume + log_volume(following, correlation),
     )
@@ -172,17 +166,14 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     core = jnp.broadcast_to(core, (len(blocks.count), CORE))
     fitted = jnp.einsum("gij,gj->gi", factor[..., :CORE], core)
     volume = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
+    columns = {
+        "run": (factor[..., ONE], blocks.run),
+        "specimen": (factor[..., :CORE] @ slope, blocks.specimen),
+    }
     size = factor.shape[1]
     return _Rows(
         (factor[..., -1] - fitted).reshape(-1),
-        {
-            "run": jnp.repeat(blocks.run, size),
-            "specimen": jnp.repeat(blocks.specimen, size),
-        },
-        {
-            "run": factor[..., ONE].reshape(-1),
-            "specimen": (factor[..., :CORE] @ slope).reshape(-1),
-        },
+        {n: (c.reshape(-1), jnp.repeat(of, size)) for n, (c, of) in columns.items()},
         factor[..., CORE:-1].reshape(fitted.size, -1),
         volume + log_volume(jnp.sum(blocks.following), correlation),
     )

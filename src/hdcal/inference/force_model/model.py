@@ -24,15 +24,19 @@ from hdcal.physics.theory import Scalar
 
 CONTACT = "deformation_offset"
 SLACK = "seating_slack.clearance"
+# Unit of the coordinate of an amplitude, in sds of its prior.
+_AMPLITUDE = 0.1
 
 
 def declare(problem: Problem) -> None:
     """Declare the joint density of parameters and data of the force model."""
     priors, values = problem.priors, sample_stiffness(problem.priors)
     values["alpha"] = sample_site("alpha", priors["alpha"])
-    if problem.runs:
-        values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
-    values["force_offset"] = _sample_zero(problem, values)
+    # The force at the centre of the readings is constant along the ridge of zero and
+    # stiffness, which is curved in the zero and the logarithm of the stiffness.
+    there = stiffness(problem, values) * problem.centre
+    name = "force_offset"
+    values[name] = sample_moved(name, priors[name], "_centre_force", shift=there)
     with_slack = SLACK in priors
     if not with_slack:
         values[CONTACT] = sample_site(CONTACT, priors[CONTACT])
@@ -76,18 +80,16 @@ def _scaled_and_moved(name: str, prior: Prior, scale, shift) -> dist.Distributio
     return dist.TransformedDistribution(base, transform)
 
 
-def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
-    """Sample a parameter of an effect; `unit` is that of a half-normal one, or None.
+def sample_amplitude(name: str, prior: Prior, over: Scalar = 1.0):
+    """Sample a half-normal amplitude as unit · log(1 + eᵘ), with `over` in the unit.
 
-    A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
-    resolve: linear where they do, and a logarithm only below that. A plain logarithm
-    stretches the neighbourhood of zero, where an absent effect has its posterior. The
-    logistic density of u is divided out.
+    Linear where the data determine it, and a logarithm only far below its prior sd. A
+    plain logarithm stretches the neighbourhood of zero, where an absent effect has its
+    posterior. The logistic density of u is divided out.
     """
-    if unit is None:
-        return sample_site(name, prior)
     logistic = dist.Logistic(0.0, 1.0)
     u = numpyro.sample(f"_{name}", logistic)
+    unit = _AMPLITUDE * prior.numbers[0] / over
     size = unit * softplus(u)
     log_jacobian = jnp.log(unit) + log_sigmoid(u)
     log_prior = distribution(prior, name).log_prob(size) + log_jacobian
@@ -105,20 +107,6 @@ def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
     modulus = with_gains(values, values["E0"])
     values["K"] = sample_moved("K", priors["K"], "_KE0", modulus)
     return values
-
-
-def _sample_zero(problem: Problem, values: Mapping):
-    """Sample the zero of the force, of far readings by the force at their centre.
-
-    That force is constant along the ridge of zero and stiffness, which is curved in
-    the zero and the logarithm of the stiffness.
-    """
-    name = "force_offset"
-    prior = problem.priors_given(values)[name]
-    if not problem.far:
-        return sample_site(name, prior)
-    there = stiffness(problem, values) * problem.centre
-    return sample_moved(name, prior, "_centre_force", shift=there)
 
 
 def _sample_contact(problem: Problem, values: Mapping):
@@ -158,49 +146,47 @@ def _sample_effect(
     """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
-        unit = problem.units.get(name)
-        unit = None if unit is None else unit / over
-        values[name] = sample_amplitude(name, problem.priors[name], unit)
+        prior = problem.priors[name]
+        if prior.family == "half_normal":
+            values[name] = sample_amplitude(name, prior, over)
+        else:
+            values[name] = sample_site(name, prior)
 
 
 def _sample_members(problem: Problem, values: dict) -> None:
-    """Sample runs, specimens and the discrepancy, and the last two's scales."""
+    """Sample scales of runs, specimens and discrepancy, and members if not integrated.
+
+    Runs and specimens are deviations from the mean of the tested ones.
+    """
     integrated, priors = problem.integrated, problem.priors
+    names = ["run_offset_sd"] if problem.runs else []
+    names += ["specimen_sd"] if problem.specimens else []
+    names += ["gap_sd", "gap_length"] if problem.discrepancy is not None else []
+    values |= {name: sample_site(name, priors[name]) for name in names}
     if problem.runs and "run" not in integrated:
         known = _mean_sd(problem, values, problem.runs)
         values["run_offset"] = _sample_deviations(
             "run_offset", values["run_offset_sd"], known, problem.runs
         )
-    if problem.specimens:
-        name = "specimen_sd"
-        values[name] = sample_site(name, priors[name])
-        if "specimen" not in integrated:
-            usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
-            known = _mean_sd(problem, values, problem.specimens) / usual
-            values["specimen_deviation"] = _sample_deviations(
-                "specimen_deviation", values[name], known, problem.specimens
-            )
-    if (gap := problem.discrepancy) is not None:
-        for name in ("gap_sd", "gap_length"):
-            values[name] = sample_site(name, priors[name])
-        if "discrepancy" not in integrated:
-            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
-            scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
-            values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
+    if problem.specimens and "specimen" not in integrated:
+        usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
+        known = _mean_sd(problem, values, problem.specimens) / usual
+        values["specimen_deviation"] = _sample_deviations(
+            "specimen_deviation", values["specimen_sd"], known, problem.specimens
+        )
+    if (gap := problem.discrepancy) is not None and "discrepancy" not in integrated:
+        score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
+        scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
+        values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 
 def _sample_deviations(name: str, sd, known_sd, count: int):
-    """Sample the deviation of each tested member from the mean of the tested ones.
+    """Sample deviations of tested members with this sd between members.
 
-    Partially centred: scores are in posterior sds of a member, so that they are as wide
-    where members agree as where they clearly differ. Either extreme is a funnel for
-    the other (Papaspiliopoulos, Roberts and Sköld, Statistical Science 22, 2007).
-
-    Args:
-        name: site of the members.
-        sd: between members.
-        known_sd: about how well the readings of a member determine it.
-        count: number of members.
+    Partially centred, with `known_sd` about how well the readings determine a member:
+    scores are in its posterior sds, as wide where members agree as where they clearly
+    differ. Either extreme is a funnel for the other (Papaspiliopoulos, Roberts and
+    Sköld, Statistical Science 22, 2007).
     """
     spread = jnp.sqrt(1.0 + (sd / known_sd) ** 2)
     score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(spread, (count,)))

@@ -1,4 +1,4 @@
-"""A pilot fit by least squares, and whether its noise grows with the deformation."""
+"""A fit by least squares, and whether its noise grows with the deformation."""
 
 from typing import NamedTuple
 
@@ -29,20 +29,8 @@ _MOST_COLUMNS = 50
 _stop_cells = jit(stop_cells)
 
 
-class Pilot(NamedTuple):
-    """A fit before any sampling.
-
-    Attributes:
-        residual: of each row [N].
-        noise_sd: of the noise [N].
-    """
-
-    residual: np.ndarray
-    noise_sd: float
-
-
 class BaseForces(NamedTuple):
-    """The base model of least squares.
+    """A linear model of the force, fitted by least squares.
 
     Attributes:
         columns: orthonormal, shape (n, p).
@@ -59,9 +47,16 @@ class BaseForces(NamedTuple):
         """What the columns leave of the force [N]."""
         return self.force - self.columns @ (self.columns.T @ self.force)
 
+    @property
+    def noise_sd(self) -> float:
+        """Sd of the noise [N]."""
+        residual = self.residual
+        free = max(len(residual) - self.columns.shape[1] - self.taken, 1)
+        return float(np.sqrt(residual @ residual / free))
+
 
 def base_model(records: Records, shapes: str = "line") -> BaseForces:
-    """Return the columns of a line for each specimen with a zero for each run.
+    """Return the model of a line for each specimen with a zero for each run.
 
     Args:
         records: the rows.
@@ -105,16 +100,13 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
     return BaseForces(kept, force, taken)
 
 
-def pilot_fit(records: Records, shapes: str = "bend") -> Pilot:
-    """Fit records by least squares.
+def pilot_fit(records: Records) -> BaseForces:
+    """Return a generous fit, from which the noise is read before any sampling.
 
-    By default generously, because too small a noise only chooses the exact likelihood
-    of rounded readings, which is never wrong.
+    Too small a noise only chooses the exact likelihood of rounded readings, which is
+    never wrong.
     """
-    base = base_model(records, shapes)
-    residual = base.residual
-    free = max(len(residual) - base.columns.shape[1] - base.taken, 1)
-    return Pilot(residual, float(np.sqrt(residual @ residual / free)))
+    return base_model(records, "bend")
 
 
 def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:
@@ -130,14 +122,14 @@ def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]
     return np.asarray(states)[:, : len(records.run)]
 
 
-def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
+def noise_grows(case: Case) -> bool:
     """Return whether readings clearly scatter more the farther the gear is deformed.
 
     By more than a tenth over the range, which noise in proportion to the deformation
     can do there, with no sd of each row stated and no step of the reading wider than
     the noise. What a loop leaves at its turns is no noise.
     """
-    records, pilot = case.records, pilot or pilot_fit(case.records)
+    records, pilot = case.records, pilot_fit(case.records)
     coarse = case.gear.force_resolution > pilot.noise_sd
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
@@ -145,7 +137,7 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     if far.max() < _LEAST_GROWTH * far.min():
         return False
     if "unloading" in records.known:
-        pilot = pilot_fit(records, "loop")
+        pilot = base_model(records, "loop")
     square = _added(pilot.residual, previous_rows(records)) ** 2
     if growth_p_value(square, far) >= _FALSE_ALARM:
         return False

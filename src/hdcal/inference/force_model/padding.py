@@ -19,11 +19,7 @@ _SMALLEST = 16
 
 
 def bucket_size(rows: int) -> int:
-    """Return the length that so many rows are padded to.
-
-    Lengths are 16, 24, 32, 48, 64, 96, …: from 16 rows on at most a third of the padded
-    rows are padding, and up to a million rows there are 33 lengths.
-    """
+    """Return the padded length, 2ᵏ or 3 · 2ᵏ, of so many rows."""
     power = _SMALLEST
     while power < rows:
         power *= 2

@@ -1,12 +1,17 @@
 """Priors of the sites of a force model."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
+from hdcal.inference.distributions import moments
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
@@ -47,19 +52,26 @@ def problem_priors(
     names = [*SITES, *SCALE_UNITS, *gear.gauge_priors]
     for effect in without_scatter(effects):
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
-    missing = [name for name in names if name not in table]
-    if missing:
+    if missing := [name for name in names if name not in table]:
+        example = '{ family = "normal", mean = 0.0, sd = 1.0 }'
         raise InputError(
             Finding(
                 case.name,
                 f"no prior for {name}",
-                f"add it to the gear file's [priors], e.g. {name} = "
-                '{ family = "normal", mean = 0.0, sd = 1.0 }',
+                f"add it to the gear file's [priors], e.g. {name} = {example}",
             )
             for name in missing
         )
     priors = {name: table[name] for name in names}
     priors["K"] = influence_prior(case, theory)
+    zero = priors["force_offset"]
+    if is_stated(zero) and "run" in case.records.known:
+        # A certificate states the zero of the gauge. The mean of n mountings adds 1/n
+        # of the variance between them, of which the prior gives the expectation.
+        between = float(np.hypot(*moments(priors["run_offset_sd"])))
+        middle, gauge = map(float, zero.numbers)
+        sd = float(np.hypot(gauge, between / np.sqrt(len(case.run_labels))))
+        priors["force_offset"] = replace(zero, numbers=(middle, sd))
     return priors
 
 

@@ -1,17 +1,14 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
-from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior
-from hdcal.data.records import Array, Records, lies_far
+from hdcal.data.records import Array, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, Findings
 from hdcal.exported import jit
@@ -51,7 +48,6 @@ class Problem(Sampled):
 
     Attributes:
         priors: by site name, in code units; K under the theory of the problem.
-        units: of the sampling coordinate of each half-normal amplitude.
         unit_stiffness: k_theory/E, radial [mm].
         reading: how the rig reads.
         records: all rows, padded, or None when they are compressed.
@@ -59,22 +55,19 @@ class Problem(Sampled):
         columns: basis of the discrepancy at the padded rows, or None.
         discrepancy: the leftover discrepancy, or None.
         step: rounding step [N], 0 = none.
+        centre: middle of the deformations as read [mm].
+        count: measured rows; `records` and `columns` have padding after them.
+        before: index of the row before each padded row in its run, −1 for none; or
+            None where neighbours are not correlated or rows are compressed.
         effects: effect classes in the model, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with a zero each, 0 = none.
         specimens: number of specimens with a stiffness each, 0 = none.
         integrated: kinds of members that are integrated out.
-        centre: middle of the deformations as read [mm].
-        far: whether they lie far from the origin, compared with their range.
-        count: measured rows; `records` and `columns` have padding after them.
-        before: index of the row before each padded row in its run, −1 for none; or
-            None where neighbours are not correlated or rows are compressed.
         correlated: whether neighbouring readings of a run may be correlated.
-        zero_stated: whether a certificate states the zero of the force gauge.
     """
 
     priors: dict[str, Prior]
-    units: dict[str, float]
     unit_stiffness: Float[Array, ""] | float
     reading: Reading
     records: Records | None
@@ -82,17 +75,15 @@ class Problem(Sampled):
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
+    centre: Float[Array, ""] | float
+    count: int
+    before: Int[Array, " n"] | None
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
-    centre: Float[Array, ""] | float = 0.0
-    far: bool = eqx.field(static=True, default=False)
-    count: int = 0
-    before: Int[Array, " n"] | None = None
-    correlated: bool = eqx.field(static=True, default=False)
-    zero_stated: bool = eqx.field(static=True, default=False)
+    correlated: bool = eqx.field(static=True)
 
     @property
     def sampled_weights(self) -> int:
@@ -100,24 +91,9 @@ class Problem(Sampled):
         is_sampled = "discrepancy" not in self.integrated
         return self.discrepancy.size if self.discrepancy and is_sampled else 0
 
-    def priors_given(self, values: Mapping) -> dict[str, Prior]:
-        """Return the priors, that of the force zero given how mountings differ.
-
-        A certificate states the zero of the gauge itself. To it the mean of n tested
-        mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
-
-        Args:
-            values: parameters of one draw, or medians of them.
-        """
-        if not (self.runs and self.zero_stated):
-            return self.priors
-        middle, gauge = self.priors["force_offset"].numbers
-        of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(self.runs)
-        zero = Prior("normal", (middle, jnp.hypot(gauge, of_mean)))
-        return {**self.priors, "force_offset": zero}
-
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
+        # Late: it imports this module.
         from hdcal.inference.force_model.model import declare
 
         declare(self)
@@ -184,9 +160,8 @@ def build_problem(
         # Through an effect the force need not be linear in the stiffness.
         integrated = [kind for kind in members if kind == "run" or blocks is not None]
         integrated += ["discrepancy"] if form.with_gap else []
-    problem = Problem(
+    return Problem(
         priors=without_texts(priors),
-        units={},
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         records=padded if blocks is None else None,
@@ -202,15 +177,8 @@ def build_problem(
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=tuple(integrated),
-        zero_stated=is_stated(case.gear.priors["force_offset"]),
         centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
-        far=lies_far(records),
     )
-    # Late: it imports this module.
-    from hdcal.inference.force_model.identifiability import resolved_units
-
-    units = resolved_units(problem, records, base, form.noise_sd)
-    return replace(problem, units=units)
 
 
 def _check(

@@ -8,7 +8,7 @@ from scipy import special
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import quantiles
 from hdcal.inference.force_model.serial_correlation import whitened_products
 
 # Family-wise probability that a shape is found in pure noise.
@@ -73,16 +73,18 @@ class Correlated(NamedTuple):
 
 
 class _Test(NamedTuple):
-    """A two-sided t test of the part of a column that the model leaves.
+    """A t test of the unit part of a column that the model leaves."""
 
-    `remainder` is that part, of unit length, and `coefficient` its coefficient.
-    """
-
+    name: str
     p_value: float
     coefficient: float
     error: float
-    remainder: np.ndarray
-    name: str
+    unit: np.ndarray
+
+    def size(self, column: np.ndarray) -> tuple[float, float]:
+        """Return the coefficient of the whole column, and its standard error."""
+        scale = float(self.unit @ column)
+        return self.coefficient / scale, self.error / scale
 
 
 def shapes_of(
@@ -97,10 +99,8 @@ def shapes_of(
             the rows. What the deformation leaves of the rows' order and time is then
             the smoothed scatter, which is in the residuals too.
     """
-    deformation = np.asarray(records.deformation)
-    scaled = deformation / np.max(np.abs(deformation))
+    scaled = records.deformation / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - reference_temperature
-    rows = np.arange(len(scaled), dtype=float)
     drift = "with temperature: the zero of the reading drifts with it"
     slope = "with temperature in proportion to {displacement}"
     shapes: Shapes = {
@@ -127,7 +127,7 @@ def shapes_of(
             "fall with time since the reset",
         ),
         "order": (
-            rows,
+            np.arange(len(scaled), dtype=float),
             "rise from the first row to the last",
             "fall from the first row to the last",
         ),
@@ -144,7 +144,7 @@ def find_structure(
 
     The clearest shape is taken first; the others are then tested on what it leaves,
     each at a family-wise error of `FALSE_ALARM`: Bonferroni over the shapes still
-    tried, in all searches. The sizes are those of all found shapes together.
+    tried, in all searches. Coefficients are those of all found shapes together.
 
     Args:
         data: residuals, sensitivities and shapes.
@@ -164,31 +164,20 @@ def find_structure(
         if p > FALSE_ALARM:
             break
         column, up, down = shapes.pop(best.name)
-        shape = best.coefficient * best.remainder[: len(sd)] * sd
+        shape = best.coefficient * best.unit[: len(sd)] * sd
         rms = float(np.sqrt(np.mean(shape**2)))
         way = up if best.coefficient > 0.0 else down
         words = f"The residuals {way} ({rms:.2g} {{N}} rms)."
-        scale = float(best.remainder @ column)
-        size = best.coefficient / scale, best.error / scale
-        structures.append(Structure(best.name, p, rms, words, *size))
+        structures.append(Structure(best.name, p, rms, words, *best.size(column)))
         absorbed = np.column_stack([absorbed, column])
-    if len(structures) < 2:
-        return tuple(structures)
-    return tuple(_with_others(data, each, structures, noise) for each in structures)
-
-
-def _with_others(
-    data: Whitened, one: Structure, every: list[Structure], noise: Correlated | None
-) -> Structure:
-    """Return a structure with its size beside all the others, where that is known."""
-    others = [data.shapes[each.name][0] for each in every if each is not one]
-    basis = orthonormal(np.column_stack([data.absorbed, *others]))
-    column = data.shapes[one.name][0]
-    for test in _tests(data.residual, {one.name: column}, basis, noise):
-        scale = float(test.remainder @ column)
-        size, error = test.coefficient / scale, test.error / scale
-        return replace(one, coefficient=size, error=error)
-    return one
+    for place, one in enumerate(structures if len(structures) > 1 else ()):
+        others = [data.shapes[each.name][0] for each in structures if each is not one]
+        basis = orthonormal(np.column_stack([data.absorbed, *others]))
+        column = data.shapes[one.name][0]
+        for test in _tests(data.residual, {one.name: column}, basis, noise):
+            size, error = test.size(column)
+            structures[place] = replace(one, coefficient=size, error=error)
+    return tuple(structures)
 
 
 def orthonormal(absorbed: np.ndarray) -> np.ndarray:
@@ -224,7 +213,8 @@ def _tests(
     table = np.column_stack([basis, *units.values(), left])
     before, rho = np.full(len(residual), -1), np.zeros(1)
     if noise is not None:
-        before, rho = noise.before, _quantiles(noise.prior)
+        rho = np.minimum(quantiles(noise.prior, _CORRELATIONS), _CLOSEST)
+        before = noise.before
     products, log_weight = whitened_products(table, before, rho)
     absorbed, mixed = products[:, :size, :size], products[:, :size, size:]
     rest = products[:, size:, size:] - mixed.mT @ np.linalg.solve(absorbed, mixed)
@@ -241,13 +231,5 @@ def _tests(
             float(chance @ each)
             for each in (2.0 * special.stdtr(free, -t), cross / square, sd)
         )
-        tests.append(_Test(p, coefficient, sd, unit, name))
+        tests.append(_Test(name, p, coefficient, sd, unit))
     return tests
-
-
-def _quantiles(prior: Prior) -> np.ndarray:
-    """Return quantiles of the prior of a correlation, below one."""
-    if prior.family == "fixed":
-        return np.array([float(prior.numbers[0])])
-    share = (np.arange(_CORRELATIONS) + 0.5) / _CORRELATIONS
-    return np.minimum(frozen(prior).ppf(share), _CLOSEST)

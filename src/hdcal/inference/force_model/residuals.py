@@ -33,7 +33,6 @@ from hdcal.inference.force_model.serial_correlation import (
 )
 from hdcal.inference.force_model.values import predict_rows
 from hdcal.inference.posterior import Posterior
-from hdcal.notebook import Shown
 from hdcal.quantities import FORCE, Quantities
 
 NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
@@ -49,8 +48,8 @@ _NORMAL, _EFFICIENCY = 1.4826, 0.37
 _WILD, _SHARE, _FEW = 12.0, 0.02, 3
 
 
-@dataclass(frozen=True, repr=False)
-class Residuals(Shown):
+@dataclass(frozen=True)
+class Residuals:
     """Measured against fitted, row by row; the fit is the posterior mean reading.
 
     Attributes:
@@ -135,7 +134,7 @@ def _fit(problem, values, records, columns):
 def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
     """Return residuals, sensitivities and shapes in noise and prior sds."""
     case, centre = posterior.case, posterior.median
-    sd, priors = near.sd, posterior.effective_priors
+    sd, priors = near.sd, posterior.priors
     columns, pull = [near.members], [*-near.place]
     for name, slope in near.slopes.items():
         mean, prior_sd = moments(priors[name], name)
@@ -156,10 +155,7 @@ def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
 
 
 def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
-    """Return a warning for each fault of the noise, for answers that rest on it.
-
-    A shape of the residuals is no such fault: what is predicted has a bend for it.
-    """
+    """Return a warning for each fault of the noise, for answers that depend on it."""
     words = [fault.words for fault in residuals(posterior).noise]
     correlation = correlation_check(posterior.draws, len(posterior.case.records.force))
     if correlation.outcome == "warning":
@@ -291,7 +287,7 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     words = (
         f"Reading {row + 1}, {force:.4g} {{N}} at {place:.4g} "
         f"{{mm}}, lies {off:.3g} {{N}} off, "
-        f"{times[row]:.0f} times as far as readings scatter{others}: all that is said "
+        f"{times[row]:.0f} times as far as readings scatter{others}: every number "
         "here may be off."
     )
     return Structure(WILD, float(chance[row]) if is_wild else 1.0, off, words)

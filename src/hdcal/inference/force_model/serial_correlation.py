@@ -52,9 +52,7 @@ def log_volume(following, correlation) -> Float[Array, "*r"]:
 def whitened_products(
     table: np.ndarray, before: np.ndarray, correlation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return inner products of columns whitened with each ρ, and log |dz/de|.
-
-    Of shape (r, p, p) and (r,).
+    """Return inner products of whitened columns (r, p, p), and log |dz/de| (r,).
 
     Args:
         table: columns in noise sds, shape (m, p); rows after those of the data are

@@ -12,18 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import quantiles
 from hdcal.inference.force_model.discrepancy import (
     BASIS_SIZE,
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.force_model.noise_form import (
-    BaseForces,
-    Pilot,
-    base_model,
-    pilot_fit,
-)
+from hdcal.inference.force_model.noise_form import BaseForces, base_model, pilot_fit
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
@@ -73,10 +68,7 @@ class ModelStructure:
 
 
 def decide_structure(
-    case: Case,
-    effects: Sequence[type[Effect]] = (),
-    with_gap: bool | None = None,
-    pilot: Pilot | None = None,
+    case: Case, effects: Sequence[type[Effect]] = (), with_gap: bool | None = None
 ) -> ModelStructure:
     """Return the structure that the readings of a case show.
 
@@ -85,9 +77,8 @@ def decide_structure(
         effects: in the model. What they explain cannot be distinguished from a bend
             here, so that with effects a leftover is in the model only on request.
         with_gap: whether the leftover discrepancy is in the model; None decides.
-        pilot: fit of these records, where there is one.
     """
-    noise_sd = (pilot or pilot_fit(case.records)).noise_sd
+    noise_sd = pilot_fit(case.records).noise_sd
     base = base_model(case.records, "bend" if effects else "line")
     # What the gear file states of the correlation is in the model.
     is_stated = case.gear.scale_priors[CORRELATION].family != "uniform"
@@ -157,12 +148,12 @@ def _best_form(
         gap = build_discrepancy(records)
         shapes = np.asarray(discrepancy_columns(gap, pad_records(records)))
         others = np.column_stack([shapes[: len(others)], others])
-        lengths = _quantiles(priors["gap_length"], "gap_length", _LENGTHS)
+        lengths = quantiles(priors["gap_length"], _LENGTHS, "gap_length")
         scales = [np.asarray(gap.prior_sd(1.0, one)) for one in lengths]
     columns = base.columns
     table = np.hstack([columns, others - columns @ (columns.T @ others)])
     before, width = previous_rows(records), columns.shape[1]
-    rho = _quantiles(priors[CORRELATION], CORRELATION, _CORRELATIONS)
+    rho = quantiles(priors[CORRELATION], _CORRELATIONS, CORRELATION)
 
     def log_evidence(form: tuple[bool, bool]) -> float:
         products = whitened_products(table, before, rho if form[1] else np.zeros(1))
@@ -204,10 +195,3 @@ def _log_chances(
             left = max(left, 1e-12 * square)
             volumes = volume + 0.5 * np.sum(np.log1p(gain * strength))
             yield -volumes - 0.5 * free * np.log(left)
-
-
-def _quantiles(prior, name: str, count: int) -> np.ndarray:
-    """Return quantiles of a prior that stand for it with equal weights."""
-    if prior.family == "fixed":
-        return np.array([float(prior.numbers[0])])
-    return np.asarray(frozen(prior, name).ppf((np.arange(count) + 0.5) / count))

@@ -32,18 +32,14 @@ LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 def with_gains(values: Values, ratio: Any) -> Any:
     """Return force per deformation as read from the true one."""
-    if "force_gain" in values:
-        ratio = ratio * (1.0 + values["force_gain"])
-    if "deformation_gain" in values:
-        ratio = ratio / (1.0 + values["deformation_gain"])
-    return ratio
+    gain = 1.0 + values.get("force_gain", 0.0)
+    return ratio * gain / (1.0 + values.get("deformation_gain", 0.0))
 
 
 def where_read(values: Values, stiffness: Any) -> Any:
     """Return the stiffness where T_ref is read from that at a true T_ref."""
-    if "temperature_offset" in values:
-        stiffness = stiffness / (1.0 - values["alpha"] * values["temperature_offset"])
-    return stiffness
+    offset = values.get("temperature_offset", 0.0)
+    return stiffness / (1.0 - values["alpha"] * offset)
 
 
 def as_read(values: Values, stiffness: Any) -> Any:
@@ -53,16 +49,13 @@ def as_read(values: Values, stiffness: Any) -> Any:
 
 def shown(values: Values, deformation: Any, temperature: Any) -> tuple[Any, Any]:
     """Return what the gauges show at a true deformation and temperature."""
-    if "deformation_gain" in values:
-        deformation = deformation * (1.0 + values["deformation_gain"])
-    if "temperature_offset" in values:
-        temperature = temperature + values["temperature_offset"]
-    return deformation, temperature
+    deformation = deformation * (1.0 + values.get("deformation_gain", 0.0))
+    return deformation, temperature + values.get("temperature_offset", 0.0)
 
 
 def acting(values: Values, force: Any) -> Any:
     """Return the force that acts from one that is read, zero taken off."""
-    return force / (1.0 + values["force_gain"]) if "force_gain" in values else force
+    return force / (1.0 + values.get("force_gain", 0.0))
 
 
 def stiffness(problem: "Problem", values: Values) -> Float[Array, ""]:
