@@ -21,9 +21,8 @@ def log(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_check_draws_the_readings(here: Hdcal, log: Path, ending, begins):
-    picture = log.with_suffix(f".{ending}")
+def test_check_draws_the_readings(here: Hdcal, log: Path):
+    picture = log.with_suffix(".png")
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
         assert here("check", log, "--plot", picture, *more).returncode == code
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -36,11 +36,6 @@ if TYPE_CHECKING:
     "the readings show a bend; never with an effect].",
 )
 @click.option(
-    "--constant-noise",
-    is_flag=True,
-    help="Keep the noise constant, even if it clearly grows with the force.",
-)
-@click.option(
     "--dynamic",
     is_flag=True,
     help="Calibrate mass, damping and stiffness from the motion of a gear.",

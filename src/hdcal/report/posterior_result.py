@@ -1,6 +1,8 @@
 """Fields of a result that follow from its posterior."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -8,18 +10,42 @@ from pydantic import Field, InstanceOf
 
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.checks import Check
-from hdcal.inference.diagnostics import MIN_CONTRACTION
+from hdcal.inference.diagnostics import MIN_CONTRACTION, Convergence, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
+from hdcal.physics.effect import parameters
 from hdcal.report.item import INTERVAL, Count, Digest, Interval, Item, Words, quantity
-from hdcal.report.parameters import ParameterEstimate, Quantity, parameter_estimates
 from hdcal.report.provenance import data_rows, provenance_rows
 from hdcal.report.result import Result
-from hdcal.report.words import capital, label, prior_words
+from hdcal.report.words import UNITS, capital, label, prior_words
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 # Constraint of the schema on names of parameters.
 PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
+
+
+class Quantity(Interval):
+    """An interval with its unit."""
+
+    unit: Words
+
+
+class ParameterEstimate(Quantity):
+    """A parameter with its diagnostics, NaN if the gear file fixes it.
+
+    Attributes:
+        rhat: rank-normalised split R-hat.
+        ess_bulk: effective sample size of the centre.
+        ess_tail: effective sample size of the interval's ends.
+        contraction: share of the prior's variance that the data removed.
+        driven_by: whether the data or the prior determine it.
+    """
+
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+    contraction: float = Field(json_schema_extra={"maximum": 1})
+    driven_by: Driver
 
 
 class SamplerSettings(Item):
@@ -138,7 +164,7 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
         "units": case.units,
         "part": "part" if posterior.theory == SPRING else "gear",
         "warnings": tuple(capital(c.words) for c in checks if c.outcome == "warning"),
-        "parameters": parameter_estimates(posterior),
+        "parameters": _estimates(posterior),
         "stiffness_N_per_mm": Interval.of(posterior.draws["stiffness"]),
         "flat_directions": tuple(c.words for c in checks if c.outcome == "note"),
         "checks": checks,
@@ -156,3 +182,30 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
         ),
         "posterior": posterior,
     }
+
+
+def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
+    """Return the unit in which a parameter is shown, and its factor from code units."""
+    if name == "K" and posterior.theory == SPRING:
+        code, factor = "N/mm", 1.0
+    elif name in UNITS:
+        code, factor = UNITS[name]
+    else:
+        effect_name, field = name.split(".")
+        effect = next(e for e in posterior.effects if e.name == effect_name)
+        code, factor = parameters(effect)[field].unit, 1.0
+    return posterior.case.units.unit(code), factor
+
+
+def _estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
+    """Return every parameter's estimate by name, fixed parameters last."""
+    found, draws, nan = posterior.diagnoses, posterior.draws, math.nan
+    fixed = [n for n in posterior.priors if n in draws and n not in found]
+    by_file = Convergence(nan, nan, nan, contraction=0.0, driven_by="prior")
+    estimates = {}
+    for name in (*found, *fixed):
+        unit, factor = unit_of(posterior, name)
+        interval = Interval.of(draws[name] * factor)
+        diagnosis = asdict(found.get(name, by_file))
+        estimates[name] = ParameterEstimate(**dict(interval), unit=unit, **diagnosis)
+    return estimates

@@ -17,7 +17,7 @@ from hdcal.report.charts.chart_spec import (
     Mark,
     Panel,
 )
-from hdcal.report.parameters import unit_of
+from hdcal.report.posterior_result import unit_of
 from hdcal.report.words import label, unit
 
 
