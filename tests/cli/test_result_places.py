@@ -15,8 +15,6 @@ WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
     ["fit", XB1],
-    ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
-    ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
 ]
 
 

@@ -1,4 +1,4 @@
-"""The probability that one set point of a spring keeps gears inside a gap.
+"""The probability that one set point of a spring keeps gears inside a window.
 
 A spring of rate c presses on the gear from inside at each of two opposed places. Its
 free end stands at x beyond the undeformed gear, so that in balance
