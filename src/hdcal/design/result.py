@@ -86,14 +86,9 @@ def shared_fields(
     sizes: Mapping[Any, Any],
     interval: float = INTERVAL,
 ) -> dict[str, Any]:
-    """Return the fields of every design at deformations [mm] and temperatures [°C].
+    """Return the fields of every design, at radial deformations and temperatures.
 
-    Args:
-        gears: the tested gear, or those to design.
-        deformation: radial, of any sign.
-        temperature: of the gear.
-        sizes: that differ from the tested gear's [mm], by name.
-        interval: probability inside the intervals.
+    The sizes are those that differ from the tested gear's [mm], by name.
     """
     untested, far = {}, {}
     records = gears.model.posterior.case.records

@@ -151,8 +151,7 @@ def _designs(gears: Gears, table: pd.DataFrame, interval: float) -> pd.DataFrame
 def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
     """Return quantiles of the force over the draws for every design [N], (q, d).
 
-    Deformations [mm], temperatures [°C] and stiffnesses over that of the tested gear
-    have the shape (d,).
+    Deformations [mm], temperatures [°C] and factors on the stiffness are (d,).
     """
     step = max(1, _BLOCK // gears.model.size)
     rows = (slice(start, start + step) for start in range(0, len(at), step))
