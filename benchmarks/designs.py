@@ -26,11 +26,11 @@ def measure(repeats: int) -> dict:
     """Return the seconds of each turn by the number of designs."""
     import numpy as np
 
-    from hdcal import read_case
-    from hdcal.design.gears import draw_gears
+    from hdcal import calibrate, read_case
+    from hdcal.design.gears import calibrated_gears
     from hdcal.design.study import force_quantiles
 
-    gears = draw_gears(read_case(CASE).gear, count=DRAWS)
+    gears = calibrated_gears(calibrate(read_case(CASE), draws=DRAWS // 4))
     random = np.random.default_rng(0)
     found = {}
     for name, size in SIZES.items():

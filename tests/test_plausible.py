@@ -131,7 +131,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
     ),
     (
         hdcal.inverse_design,
-        {"vary": {}, "materials": (), "limit_force": 70.0, "deformation": 0.4},
+        {"vary": {}, "limit_force": 70.0, "deformation": 0.4},
         (
             *("limit_force", "limit_stress", "probability", "deformation"),
             *("temperatures", "vary"),
@@ -140,12 +140,12 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
     (
         hdcal.wave_generator,
         {"window": (0.3, 0.4), "tolerances": {"colour_mm": 1.0}},
-        ("window", "setting_sd", "rates", "temperatures", "probability"),
+        ("window", "setting_sd", "temperatures", "probability"),
     ),
     (hdcal.wave_generator, {"window": (0.4, 0.3)}, ("tolerances",)),
     (
         hdcal.study,
-        {"vary": {"radius_mm": [38.0]}, "materials": ["stel"]},
+        {"vary": {"wall_thickness_mm": [60.0]}},
         ("deformation", "temperature", "interval", "vary"),
     ),
     (
@@ -167,7 +167,6 @@ SEVERAL = {
     "temperatures": lambda v: [20.0, v],
     "degrees": lambda v: [v],
     "window": lambda v: (v, 0.4),
-    "rates": lambda v: (v, 1.0),
     "vary": lambda v: {"radius_mm": (v, 40.0)},
 }
 READ = [*read_entries()]

@@ -14,7 +14,7 @@ from hdcal.report.saving import Target
 WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
-    ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
+    ["fit", XB1],
 ]
 
 

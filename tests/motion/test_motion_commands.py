@@ -71,8 +71,6 @@ def test_a_sampled_force_is_answered_with_a_folder(here: Hdcal, run: Path):
     ("text", "words"),
     [
         ("force_N\n1\n2\n", "no column holds the time"),
-        ("time_s,force_N\n0,1\n", "holds 1 rows"),
-        ("time_s,force_N\n0,1\n0,2\n", "not later than that of the row before"),
         ("time_s,force_stone\n0,1\n1,2\n", "unknown unit"),
     ],
 )

@@ -9,17 +9,13 @@ from posteriors import (
     batch,
     plain_draws,
     single,
-    with_leftover,
     written_posterior,
 )
 from rigs import cycles, make_case, make_records
-from schema_checks import obeys
 
-import hdcal
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.prediction.bands.predict import default_bands, predict
-from hdcal.prediction.bands.result import Bands
 from hdcal.prediction.conditions import is_tested
 
 
@@ -142,16 +138,3 @@ def test_a_failed_posterior_predicts_nothing(rubbing):
     with pytest.raises(NotUsable, match="made to fail"):
         predict(failed, [0.1])
     assert not default_bands(failed).usable.any()
-
-
-def test_the_result_describes_itself():
-    for make, gap in ((single, False), (with_leftover, True)):
-        found = hdcal.predict(make(size=200), [0.1, 0.6], [20.0, 60.0])
-        answer = found.to_dict()
-        obeys(answer, Bands)
-        frame = found.to_frame()
-        assert [*answer["columns"]] == [*frame] and len(frame) == 4
-        assert (answer["columns"]["with_gap_lo_N"][0] is not None) == gap
-        assert answer["columns"]["tested"] == [True, False, False, False]
-        assert "<table" in found._repr_html_() and "0.6" in found.text()
-        assert found.plot().get_ylabel() == "force [N]"

@@ -46,20 +46,6 @@ def check(found) -> None:
     assert found.coverage_factor == pytest.approx(half / total**0.5)
 
 
-@pytest.mark.parametrize("sigma", [0.01, 1.5, 40.0])
-def test_shares_sum_to_one_where_a_component_is_nearly_all(sigma: float):
-    found = hdcal.margin(exact(sigma=sigma), 0.4)
-    check(found)
-
-
-def test_noise_alone_is_a_normal():
-    found = hdcal.margin(exact(), 0.1)
-    rows = by_component(found)
-    assert rows["reading noise"].standard_uncertainty == pytest.approx(1.5, rel=1e-9)
-    assert found.combined_standard_uncertainty_N == pytest.approx(1.5, rel=0.02)
-    assert found.coverage_factor == pytest.approx(1.96, abs=0.02)
-
-
 def test_every_source_has_a_row():
     gears = batch(6, 400)
     models = [(0.6, gears), (0.4, stiffer(gears, 1.05))]

@@ -1,5 +1,7 @@
 """Probabilities of exceedance against exact laws, and what draws do not resolve."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from posteriors import single, written_posterior
@@ -19,7 +21,7 @@ def normal():
     return exact(4000)
 
 
-@pytest.mark.parametrize("chance", [0.3, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("chance", [0.3, 1e-3, 1e-5])
 def test_a_normal_tail_is_exact(normal, chance: float):
     limit = middle(normal) + 1.5 * stats.norm.isf(chance)
     risk = hdcal.margin(normal, 0.1, limit_force=limit).worst.exceedance
@@ -39,7 +41,7 @@ def student(count: int, dof: float):
     return written_posterior(known.case, {**known.draws, "sigma": sigma})
 
 
-@pytest.mark.parametrize("chance", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("chance", [1e-1, 1e-3, 1e-5])
 def test_a_student_tail_is_exact_or_an_upper_limit(chance: float):
     posterior, dof = student(4000, 6.0), 6.0
     limit = middle(posterior) + 1.5 * stats.t.isf(chance, dof)
@@ -69,25 +71,8 @@ def test_the_stated_error_is_the_scatter_over_posteriors():
     assert np.mean([risk.error for risk in found]) == pytest.approx(expected, rel=0.35)
 
 
-@pytest.mark.parametrize("sds", [5.5, 8.0, 40.0])
-def test_no_probability_is_below_one_in_a_million(normal, sds: float):
-    limit = middle(normal) + 1.5 * sds
-    risk = hdcal.margin(normal, 0.1, limit_force=limit).worst.exceedance
-    assert not risk.resolved and risk.probability >= RAREST
-    assert np.isfinite(risk.beta)
-
-
-def test_a_capacity_far_below_is_exceeded_by_all():
-    found = hdcal.margin(single(size=400), 0.4, limit_force=20.0)
-    risk = found.worst.exceedance
-    assert risk.resolved and risk.probability == pytest.approx(1.0)
-    assert risk.lo == risk.at_confidence == 1.0 and np.isfinite(risk.beta)
-
-
 def test_draws_that_depend_on_each_other_have_a_larger_error():
     """The fewer effective draws the larger the error, in proportion to its root."""
-    from dataclasses import replace
-
     posterior = student(4000, 6.0)
     limit = middle(posterior) + 1.5 * stats.t.isf(1e-2, 6.0)
     errors = []
@@ -102,9 +87,16 @@ def test_draws_that_depend_on_each_other_have_a_larger_error():
     assert errors[2] == pytest.approx(4.0 * errors[0])
 
 
-def test_a_load_that_no_draw_exceeds_is_not_resolved():
-    """A load has no scatter within a draw: nothing lies above a far limit."""
-    posterior = single()
-    risk = hdcal.margin(posterior, 0.4, quantity="load", limit_force=200.0).worst
-    assert not risk.exceedance.resolved
-    assert risk.exceedance.probability >= 3.0 / len(posterior.draws["K"])
+def test_what_the_draws_do_not_resolve_is_an_upper_limit(normal):
+    """Far out, and of a load, which has no scatter within a draw."""
+    for sds in (5.5, 40.0):
+        limit = middle(normal) + 1.5 * sds
+        risk = hdcal.margin(normal, 0.1, limit_force=limit).worst.exceedance
+        assert not risk.resolved and risk.probability >= RAREST
+        assert np.isfinite(risk.beta)
+    asked = {"quantity": "load", "limit_force": 200.0}
+    risk = hdcal.margin(single(), 0.4, **asked).worst.exceedance
+    assert not risk.resolved and risk.probability >= 3.0 / 2000
+    risk = hdcal.margin(single(size=400), 0.4, limit_force=20.0).worst.exceedance
+    assert risk.resolved and risk.probability == pytest.approx(1.0)
+    assert risk.lo == risk.at_confidence == 1.0 and np.isfinite(risk.beta)

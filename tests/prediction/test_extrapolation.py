@@ -72,16 +72,6 @@ def test_laws_have_the_probability_of_the_residuals():
     assert means[1] > 3.0 * means[0]
 
 
-def test_each_draw_has_a_law_by_its_probability():
-    bend, at = fit_bends(curved()[2])[1], np.array([0.3, 0.6, 0.8])
-    levels = (np.arange(100_000) + 0.5) / 100_000
-    drawn = bend.of_draws(at, levels)
-    for found, law in zip(drawn, bend.law(at), strict=True):
-        np.testing.assert_allclose(found.mean(axis=0), bend.chances @ law, rtol=1e-3)
-    law = int(np.searchsorted(np.cumsum(bend.chances), 0.5))
-    np.testing.assert_allclose(drawn[1][50_000], bend.law(at)[1][law])
-
-
 @pytest.mark.parametrize("make", slice_of([single, with_leftover], [with_leftover]))
 @pytest.mark.parametrize("at", [0.02, 0.28, 0.54])
 def test_there_is_no_step_at_the_ends_or_in_the_middle(make, at: float):
@@ -97,10 +87,9 @@ def width(posterior, at: float) -> float:
     return found.hi - found.lo
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-200])
-def test_readings_without_noise_have_hardly_a_bend(noise: float):
+def test_readings_without_noise_have_hardly_a_bend():
     x, rng = np.linspace(0.02, 0.54, 20), np.random.default_rng(8)
-    posterior = regressed(x, 200.0 * x, rng, 200, sigma=noise)
+    posterior = regressed(x, 200.0 * x, rng, 200, sigma=0.0)
     found = hdcal.predict(posterior, [0.3, 0.9])
     np.testing.assert_allclose(found.physics_lo_N, [60.0, 180.0], atol=0.5)
     np.testing.assert_allclose(found.physics_hi_N, [60.0, 180.0], atol=0.5)

@@ -93,22 +93,18 @@ def test_resistance_and_reactance_of_h2():
 
 
 ROOT3 = 3.0**0.5
-# JCGM 101:2008, Tables 2, 3 and 4: sds of the rectangular inputs, half the interval.
-ADDED = {"9.2.3": ((1.0,) * 4, 2.0, 3.88), "9.2.4": ((1.0,) * 3 + (10.0,), 10.1, 17.0)}
 
 
-@pytest.mark.parametrize("name", ADDED)
-def test_the_additive_model_of_9_2(name: str):
-    sds, printed, half = ADDED[name]
-    draw = Inputs()
+def test_the_additive_model_of_9_2():
+    """JCGM 101:2008, Table 4: rectangular inputs, of which one is ten times larger."""
+    draw, sds = Inputs(), (1.0, 1.0, 1.0, 10.0)
     inputs = {f"x{i}": draw.within(-ROOT3 * sd, ROOT3 * sd) for i, sd in enumerate(sds)}
     output = sum(inputs.values())
-    assert output.std() == pytest.approx(printed, abs=0.06 if printed > 9 else 0.005)
-    ends = np.abs(np.quantile(output, [0.025, 0.975]))
-    assert ends == pytest.approx(half, abs=0.06 if half > 9 else 0.02)
+    assert output.std() == pytest.approx(10.1, abs=0.06)
+    assert np.abs(np.quantile(output, [0.025, 0.975])) == pytest.approx(17.0, abs=0.06)
     parts = shares_of(output, inputs)
     for each, sd in zip(inputs, sds, strict=True):
-        assert abs(parts[each] - sd**2) < 5e-3 * sd**2 + (0.06 if half > 9 else 0.02)
+        assert abs(parts[each] - sd**2) < 5e-3 * sd**2 + 0.06
     assert parts["rest"] < 1e-6
 
 
@@ -138,8 +134,6 @@ def test_the_mass_calibration_of_9_3():
 # JCGM 101:2008, Tables 8 and 9 in 1e-6: correlation, x₁; mean, u, shortest interval.
 MISMATCH = [
     (0.0, 0.000, 50, 50, (0, 150)),
-    (0.0, 0.050, 2551, 502, (1590, 3543)),
-    (0.9, 0.010, 150, 121, (13, 398)),
     (0.9, 0.050, 2551, 505, (1628, 3555)),
 ]
 

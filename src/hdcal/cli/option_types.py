@@ -216,11 +216,6 @@ def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, st
     )
 
 
-def read_list(texts: Sequence[str], option: str) -> list[str]:
-    """Read names that are repeated or separated by commas."""
-    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
-
-
 ENDS = Parsed("LO:HI", read_ends)
 DEFORMATIONS = Parsed("START:STOP:COUNT", read_deformations)
 NUMBERS = Parsed("LIST", read_grid)

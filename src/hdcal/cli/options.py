@@ -11,7 +11,6 @@ from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
     read_all,
     read_columns,
-    read_list,
     read_named,
     read_quantity,
 )
@@ -145,24 +144,6 @@ def direction_option(help: str, default: str | None = "up") -> Decorator:
     ways = click.Choice(["up", "down"])
     return click.option(
         "--direction", type=ways, default=default, show_default=True, help=help
-    )
-
-
-# A command needs one of the two.
-start_options = combined(
-    click.argument("run", metavar="RUN", required=False),
-    click.option(
-        "--gear",
-        metavar="GEAR.toml",
-        help="Use the priors of this gear instead of RUN.",
-    ),
-)
-
-
-def material_option(help: str) -> Decorator:
-    """Return --material, with this help."""
-    return repeated_option(
-        "--material", "materials", metavar="NAME", read=read_list, help=help
     )
 
 

@@ -101,7 +101,6 @@ RANGES = {
     "limit_stress": Range(1e-6, 1e7, "MPa", _STEEL),
     "tolerance": Range(0.0, 1e5, "mm", "from exact to a hundred metres"),
     "setting_sd": Range(0.0, 1e3, "mm", "from exact to a metre"),
-    "rate": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
     "duration": Range(1e-9, 1e9, "s", "from a nanosecond to thirty years"),
     "damping": Range(0.0, 1e9, "N·s/mm", "from none to as stiff as a wall"),
     # how it is computed
@@ -130,7 +129,6 @@ NAMES = {
         "share": "content confidence probability interval",
         "correlation": "noise_correlation",
         "tolerance": "tolerances",
-        "rate": "rates",
         "degree": "degrees",
         "K": "mass_ratio",
         "alpha": "spring_alpha",

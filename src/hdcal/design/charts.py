@@ -101,20 +101,13 @@ def study_chart(found: "Study") -> spec.Chart:
     """Return the median force with its interval over what was varied first.
 
     There is a curve for each combination of what else was varied; of more than six only
-    some. Materials alone have a point each.
+    some.
     """
     columns = {name: np.array(each) for name, each in found.designs.items()}
     forces = np.stack([columns[f"force_{end}_N"] for end in ("lo", "median", "hi")])
     kind = found.interval_kind.removeprefix("equal-tailed ")
     title, y = f"Median and {100.0 * found.interval:g} % {kind}", "force [N]"
-    along = next((name for name in found.varied if name != "material"), None)
-    if along is None:
-        low, middle, high = forces
-        x, names = np.arange(1.0, len(middle) + 1.0), columns["material"].tolist()
-        points = spec.Points(label=title, x=x, y=middle, low=low, high=high)
-        return spec.Chart(
-            panels=[spec.Panel(x="material", y=y, marks=[points], names=names)]
-        )
+    along = found.varied[0] if found.varied else "deformation_mm"
     others, marks = [name for name in found.varied if name != along], []
     labels = [title] * len(columns[along])
     if others:

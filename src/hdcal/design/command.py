@@ -1,7 +1,6 @@
 """`hdcal design` and `hdcal study`."""
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import click
@@ -24,32 +23,22 @@ from hdcal.design import AXES, SIZE_NAMES
 from hdcal.errors import Finding
 
 # Parameters of one question only.
-_OF_WINDOW = ("window", "setting_sd", "rates")
-_OF_LIMIT = ("limit_force", "limit_stress", "deformation", "vary", "materials")
+_OF_WINDOW = ("window", "setting_sd")
+_OF_LIMIT = ("limit_force", "limit_stress", "deformation", "vary")
 
 
-def _open(console: Console, run, gear, out, force, kind: str) -> Any:
-    """Return the calibration or gear, and reserve the folder of the result."""
-    from hdcal.data.gear import read_gear
+def _open(console: Console, run, out, force, kind: str) -> Any:
+    """Return the calibration, and reserve the folder of the result."""
     from hdcal.inference.model_average import load_models
 
-    if (run is None) == (gear is None):
-        words = "is missing" if run is None else "and `gear` are given both"
-        remedy = "Name a folder of hdcal calibrate, or `gear` GEAR.toml for priors only"
-        console.wrong.append(Finding("run", words, remedy))
-        return None
-    if gear is not None:
-        source, name = console.wrong.attempt(read_gear, gear), Path(gear).stem
-    else:
-        source = console.wrong.attempt(load_models, run)
-        name = "" if source is None else source.case.name
-    if source is not None:
-        console.reserve_folder(out or f"{name}-{kind}", force)
-    return source
+    models = console.wrong.attempt(load_models, run)
+    if models is not None:
+        console.reserve_folder(out or f"{models.case.name}-{kind}", force)
+    return models
 
 
 @command(short_help="Design a wave generator, or sizes for a limit.")
-@options.start_options
+@click.argument("run", metavar="RUN")
 @click.option(
     "--window",
     type=ENDS,
@@ -60,12 +49,6 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
     type=LENGTH,
     default=0.0,
     help="Set the standard deviation of the set point [mm].",
-)
-@click.option(
-    "--spring-rate",
-    "rates",
-    type=ENDS,
-    help="Consider spring rates in this range [N/mm].",
 )
 @click.option(
     "--limit-force", type=FORCE, help="Design sizes that keep the force below this [N]."
@@ -86,7 +69,6 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
     read=partial(read_named, read=read_ends, known=lambda: SIZE_NAMES),
     help="Vary a size in a range: wall_thickness_mm=0.5:0.8. May be repeated.",
 )
-@options.material_option("Choose among materials [default: that of the gear].")
 @click.option(
     "--temperature",
     "temperatures",
@@ -101,8 +83,8 @@ def _open(console: Console, run, gear, out, force, kind: str) -> Any:
 @options.folder_options("Write the result to DIR [default: NAME-design].")
 @options.json_option
 @click.pass_obj
-def design(console: Console, run, gear, out, force, **given):
-    """Design from RUN, a result folder of `hdcal calibrate`.
+def design(console: Console, run, out, force, **given):
+    """Design from RUN, a folder of `hdcal calibrate` or `hdcal diagnose`.
 
     --window designs the softest spring of an elastic wave generator that keeps the
     gear between backlash, at the end nearer to zero, and jamming, at the other end.
@@ -120,14 +102,14 @@ def design(console: Console, run, gear, out, force, **given):
             wrong.append(Finding("--window and --limit-force", words, remedy))
         mode = "--window" if window else "--limit-force"
         wrong += [] if window == limit else options.without_meaning(unused, mode)
-        source = _open(console, run, gear, out, force, "design")
+        models = _open(console, run, out, force, "design")
     asked = {name: value for name, value in given.items() if name not in unused}
     answer = wave_generator if window else inverse_design
-    return console.show(answer(source, **asked), answer="design.json")
+    return console.show(answer(models, **asked), answer="design.json")
 
 
-@command(short_help="Compute the force over sizes and materials.")
-@options.start_options
+@command(short_help="Compute the force over sizes.")
+@click.argument("run", metavar="RUN")
 @options.repeated_option(
     "--vary",
     metavar="NAME=VALUES",
@@ -135,7 +117,6 @@ def design(console: Console, run, gear, out, force, **given):
     help="Vary wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45. May be repeated. "
     "Also length_mm, load_height_mm, deformation_mm, temperature_C.",
 )
-@options.material_option("Compare materials [default: that of the gear].")
 @click.option(
     "--deformation",
     type=LENGTH,
@@ -150,18 +131,18 @@ def design(console: Console, run, gear, out, force, **given):
 @options.folder_options("Write the result to DIR [default: NAME-study].")
 @options.json_option
 @click.pass_obj
-def study(console: Console, run, gear, out, force, **asked):
-    """Compute the force for every combination of sizes from RUN.
+def study(console: Console, run, out, force, **asked):
+    """Compute the force for every combination of sizes, from RUN.
 
-    RUN is a result folder of `hdcal calibrate`.
+    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`.
     """
     from hdcal.design.study import study as run_study
 
     with console.wrong as wrong:
-        if not (options.is_given("vary") or options.is_given("materials")):
+        if not options.is_given("vary"):
             remedy = "Say --vary wall_thickness_mm=0.6:0.76:5"
             wrong.append(Finding("vary", "nothing is varied", remedy))
-        source = _open(console, run, gear, out, force, "study")
-    found = run_study(source, **asked)
+        models = _open(console, run, out, force, "study")
+    found = run_study(models, **asked)
     tables = {"study.csv": found.to_frame()}
     return console.show(found, answer="study.json", tables=tables)

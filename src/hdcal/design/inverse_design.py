@@ -15,21 +15,22 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, InstanceOf, ValidationInfo, field_validator
+from scipy.optimize import minimize
 
-from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import fault, requested, within
 from hdcal.design import request
 from hdcal.design.charts import limit_chart
-from hdcal.design.gears import Gears, Sizes, draw_gears
-from hdcal.design.nearest_point import CLOSE, nearest_kept
+from hdcal.design.gears import Gears, Sizes, calibrated_gears
 from hdcal.design.result import DesignResult, Stress, shared_fields
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, InputError
 from hdcal.prediction.models import Models
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, Probability, quantity
 
 # A limit this many times larger or smaller than the force is a slip of the unit.
 _OFF = 100.0
+# A limit counts as kept when it is exceeded by less than this share of itself.
+CLOSE = 1e-6
 
 Force = Annotated[float, within("force")]
 Strength = Annotated[float, within("limit_stress")]
@@ -63,19 +64,20 @@ class LimitAsked(request.Asked):
     @field_validator("bounds")
     @classmethod
     def _check_bounds(cls, bounds: dict, info: ValidationInfo) -> dict:
+        if not bounds:
+            raise fault("nothing may change", "Free a size: wall_thickness_mm=0.5:0.8")
         at = info.data.get("deformation_mm", 0.0)
         request.check_sizes(request.gears_of(info), bounds, at)
         return bounds
 
 
 class Candidate(Stress):
-    """One material with the sizes that were found best for it.
+    """Sizes with their force and stress.
 
     The distance is √Σ (ln x/x₀)². What is kept is not exceeded with the required
     probability; without a known strength no share of the stress is kept.
     """
 
-    material: str = quantity("material")
     sizes_mm: dict[str, float] = quantity("sizes", "mm")
     met: bool = quantity("limits kept")
     change: float = quantity("distance from the tested gear")
@@ -96,7 +98,7 @@ class Candidate(Stress):
 
 @dataclass(frozen=True)
 class LimitedGears:
-    """The next gears of one material at the worst temperature, and their limits."""
+    """The next gears at the worst temperature, and their limits."""
 
     gears: Gears
     asked: LimitAsked
@@ -133,7 +135,6 @@ class LimitedGears:
         kept = forces <= self.asked.limit_force_N * (1.0 + CLOSE)
         return Candidate(
             **dict(Stress.of(gears, stress)),
-            material=gears.material,
             sizes_mm={name.removesuffix("_mm"): value for name, value in sizes.items()},
             met=bool(np.max(self.excess(sizes)) <= CLOSE),
             change=float(np.linalg.norm(steps)),
@@ -143,54 +144,68 @@ class LimitedGears:
             utilisation_kept=None if used is None else self.kept(used),
         )
 
-    def best(self) -> Candidate:
-        """Return the sizes that keep the limits with the least change."""
-        names, bounds = [*self.asked.bounds], [*self.asked.bounds.values()]
+    def nearest(self) -> Candidate:
+        """Return the sizes nearest to the tested ones that keep the limits.
+
+        By sequential quadratic programming in the logarithms of the sizes, where the
+        limits are nearly straight. If none keep them, the result does not either.
+        """
+        bounds = np.log([*self.asked.bounds.values()])
+        start = np.log([self.gears.size_of(name) for name in self.asked.bounds])
 
         def sizes(logs: np.ndarray) -> dict[str, float]:
-            return dict(zip(names, map(float, np.exp(logs)), strict=True))
+            values = map(float, np.exp(logs))
+            return dict(zip(self.asked.bounds, values, strict=True))
 
-        start = np.log([self.gears.size_of(name) for name in names])
-        if names:
-            bounds = np.log(bounds)
-            start = nearest_kept(lambda y: self.excess(sizes(y)), start, bounds)
-        return self.candidate(sizes(start))
+        inside = np.clip(start, *bounds.T)
+        if np.max(self.excess(sizes(inside))) > CLOSE:
+            inside = minimize(
+                lambda logs: float(np.sum((logs - start) ** 2)),
+                inside,
+                bounds=bounds,
+                constraints={"type": "ineq", "fun": lambda y: -self.excess(sizes(y))},
+                method="SLSQP",
+                options={"maxiter": 200, "ftol": 1e-14},
+            ).x
+        return self.candidate(sizes(np.clip(inside, *bounds.T)))
 
 
 class InverseDesign(DesignResult):
     """The sizes that keep the limits with the least change.
 
     Attributes:
-        design: the candidate nearest to the tested gear.
-        candidates: the best sizes of each material.
-        target: the gears of the chosen material, and their limits.
+        design: the sizes nearest to the tested gear.
+        target: the gears to design, and their limits.
     """
 
     template = "design/inverse_design.md.j2"
-    table = "candidates"
+    table = "designs"
 
     format: Literal["hdcal.design/1"] = "hdcal.design/1"
     kind: Literal["inverse_geometry"] = "inverse_geometry"
     asked: LimitAsked
     design: Candidate
     tested: Candidate
-    candidates: tuple[Candidate, ...]
     target: InstanceOf[LimitedGears] = Field(exclude=True)
 
+    @property
+    def designs(self) -> tuple[Candidate, ...]:
+        """The tested gear and the design."""
+        return self.tested, self.design
+
     def make_charts(self) -> Mapping[str, Chart]:
-        """Return force against limit if sizes are free."""
-        return {"design": limit_chart(self)} if self.asked.bounds else {}
+        """Return force against limit."""
+        return {"design": limit_chart(self)}
 
 
 def inverse_design(
-    source: Models | Gear | Gears,
+    models: Models,
     vary: Mapping[str, tuple[float, float]],
     limit_force: float,
     *,
     deformation: float | None = None,
     temperatures: Sequence[float] | None = None,
     probability: float = 0.99,
-    materials: Sequence[str] = (),
     limit_stress: float | None = None,
     tolerances: Mapping[str, float] | None = None,
     seed: int = 0,
@@ -198,7 +213,7 @@ def inverse_design(
     """Find the sizes nearest to the tested gear that keep a force limit.
 
     Args:
-        source: a calibration; or a gear, to use its priors.
+        models: from `calibrate` or `diagnose`.
         vary: lowest and highest value of each free size [mm]: wall_thickness_mm,
             radius_mm, length_mm, load_height_mm.
         limit_force: not to be exceeded [N]: its size, or with the force's sign.
@@ -206,60 +221,45 @@ def inverse_design(
             the gear's nominal one.
         temperatures: at all of which the limits hold [°C]; by default the reference.
         probability: with which the next gear keeps each limit.
-        materials: names or .toml files to choose among; by default the gear's own.
         limit_stress: largest hoop bending stress [MPa]; by default the material's
             yield strength where that is known.
         tolerances: ± of sizes [mm] by name; sizes are uniform within them.
-        seed: of scatter and priors.
+        seed: of the scatter.
 
     Raises:
         NotUsable: the calibration failed its checks.
         InputError: invalid input, or nothing inside the bounds keeps the limits.
     """
-    tested = draw_gears(source, seed)
-    with Findings() as wrong:
-        if not vary and not materials:
-            words, remedy = "nothing may change", "Free a size or name materials"
-            wrong.append(Finding("vary", words, remedy))
-        listed = materials or [tested.material]
-        made = [wrong.attempt(tested.of_material, name, seed) for name in listed]
-        asked = requested(
-            LimitAsked,
-            tested,
-            deformation=deformation,
-            limit_force=limit_force,
-            limit_stress=limit_stress,
-            vary=dict(vary),
-            temperatures=temperatures,
-            probability=probability,
-            tolerances=dict(tolerances or {}),
-        )
-    scatter = asked.tolerances_mm, seed, asked.sense
-    targets = [LimitedGears(one.next_ones(*scatter), asked) for one in made if one]
-    own = LimitedGears(tested.next_ones(*scatter), asked)
-    candidates = [target.best() for target in targets]
-    kept = [pair for pair in zip(candidates, targets, strict=True) if pair[0].met]
-    if not kept:
-        raise InputError([_unmet(candidates, asked)])
-    design, target = min(kept, key=lambda pair: pair[0].change)
-    place = asked.deformation_mm, asked.temperature_C, design.sizes
+    tested = calibrated_gears(models, seed)
+    asked = requested(
+        LimitAsked,
+        tested,
+        deformation=deformation,
+        limit_force=limit_force,
+        limit_stress=limit_stress,
+        vary=dict(vary),
+        temperatures=temperatures,
+        probability=probability,
+        tolerances=dict(tolerances or {}),
+    )
+    gears = tested.next_ones(asked.tolerances_mm, seed, asked.sense)
+    target = LimitedGears(gears, asked)
+    best = target.nearest()
+    if not best.met:
+        raise InputError([_unmet(best, asked)])
+    place = asked.deformation_mm, asked.temperature_C
     return InverseDesign(
-        **shared_fields(own.gears, *place),
-        materials=(design.material,),
+        **shared_fields(gears, *place, best.sizes),
         asked=asked,
-        design=design,
-        tested=own.candidate({name: tested.size_of(name) for name in asked.bounds}),
-        candidates=tuple(candidates),
+        design=best,
+        tested=target.candidate({name: gears.size_of(name) for name in asked.bounds}),
         target=target,
     )
 
 
-def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
-    best = min(found, key=lambda one: abs(one.force_kept_N))
+def _unmet(best: Candidate, asked: LimitAsked) -> Finding:
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
-    words = (
-        f"nothing keeps {asked.limit_force_N:g} N: the best ({at or best.material}) "
-    )
-    words += f"gives {best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
+    words = f"nothing keeps {asked.limit_force_N:g} N: {at} gives "
+    words += f"{best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
     remedy = "Widen the bounds, free another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

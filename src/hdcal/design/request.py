@@ -37,7 +37,7 @@ def _nominal(given: Any, info: ValidationInfo) -> Any:
 def _possible(temperature: float, info: ValidationInfo) -> float:
     gears = gears_of(info)
     rise = abs(temperature - gears.gear.reference_temperature)
-    if np.median(gears.values["alpha"]) * rise >= _MOST_LOSS:
+    if np.median(gears.model.draws["alpha"]) * rise >= _MOST_LOSS:
         words = "the linear change of E with T would lose half of Young's modulus"
         raise fault(words, "Give it in °C")
     return temperature

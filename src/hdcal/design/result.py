@@ -1,12 +1,13 @@
 """The base of the results of designs and studies."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.design.gears import Gears
+from hdcal.prediction.conditions import NEAR_K, NEAR_MM
 from hdcal.report.item import INTERVAL, Interval, Item, Words, quantity
 from hdcal.report.result import Result
 
@@ -35,8 +36,8 @@ class Stress(Item):
 class DesignResult(Result):
     """What the results of designs and studies share.
 
-    Probabilities are counted among draws; all of these do not make it certain, half of
-    an independent draw remains uncertain.
+    Probabilities are counted among draws; half of an independent draw remains
+    uncertain.
 
     Attributes:
         far_sizes: sizes more than a fifth off those of the tested gear [mm].
@@ -45,11 +46,9 @@ class DesignResult(Result):
     """
 
     source: InstanceOf[Gears] = Field(exclude=True)
-    materials: tuple[str, ...] = Field(exclude=True)
     far_sizes: dict[str, float] = Field(exclude=True)
     untested: dict[str, tuple[Ends, Ends]] = Field(exclude=True)
     gear: dict[str, str]
-    basis: Literal["posterior", "prior"]
     draws: int
     independent_draws: float
     interval: float
@@ -87,43 +86,32 @@ def shared_fields(
     sizes: Mapping[Any, Any],
     interval: float = INTERVAL,
 ) -> dict[str, Any]:
-    """Return the fields of every design at deformations [mm] and temperatures [°C].
+    """Return the fields of every design, at radial deformations and temperatures.
 
-    Args:
-        gears: of the tested gear's drawing, with scatter if there is any.
-        deformation: radial, of any sign.
-        temperature: of the gear.
-        sizes: that differ from the tested gear's [mm], by name.
-        interval: probability inside the intervals.
+    The sizes are those that differ from the tested gear's [mm], by name.
     """
-    prior, untested, far = gears.model is None, {}, {}
-    kind = "prior" if prior else "credible"
-    if gears.scatters:
-        kind = "prior predictive" if prior else "predictive"
-    if gears.model is not None:
-        records = gears.model.posterior.case.records
-        radial = np.asarray(records.deformation) * gears.radial_per_read
-        for name, asked, tested, near in (
-            ("deformation", deformation, radial, 1e-9),
-            # Thermometers are no better than 1 K.
-            ("temperature", temperature, records.temperature, 1.0),
-        ):
-            ends = [float(f(v)) for v in (asked, tested) for f in (np.min, np.max)]
-            if ends[0] < ends[2] - near or ends[1] > ends[3] + near:
-                untested[name] = ends[:2], ends[2:]
+    untested, far = {}, {}
+    records = gears.model.posterior.case.records
+    radial = np.asarray(records.deformation) * gears.radial_per_read
+    for name, asked, tested, near in (
+        ("deformation", deformation, radial, NEAR_MM),
+        ("temperature", temperature, records.temperature, NEAR_K),
+    ):
+        ends = [float(f(v)) for v in (asked, tested) for f in (np.min, np.max)]
+        if ends[0] < ends[2] - near or ends[1] > ends[3] + near:
+            untested[name] = ends[:2], ends[2:]
     for name, values in sizes.items():
         ratios = np.ravel(values) / gears.size_of(name)
         farthest = float(max(ratios, key=lambda ratio: abs(np.log(ratio))))
         if abs(np.log(farthest)) > np.log(_FAR_SIZE):
             far[name] = farthest * gears.size_of(name)
-    gear = gears.gear
+    gear, kind = gears.gear, "predictive" if gears.scatters else "credible"
     return {
         "source": gears,
         "far_sizes": far,
         "untested": untested,
         "gear": {"name": gear.name, "material": gear.material, "theory": gears.theory},
-        "basis": "prior" if prior else "posterior",
-        "draws": gears.size,
+        "draws": gears.model.size,
         "independent_draws": gears.independent,
         "interval": interval,
         "interval_kind": f"equal-tailed {kind} interval",

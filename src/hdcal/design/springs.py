@@ -1,4 +1,4 @@
-"""The probability that one set point of a spring keeps gears inside a gap.
+"""The probability that one set point of a spring keeps gears inside a window.
 
 A spring of rate c presses on the gear from inside at each of two opposed places. Its
 free end stands at x beyond the undeformed gear, so that in balance
@@ -27,11 +27,9 @@ class SpringGap(NamedTuple):
     """A window and the gears that have to stay inside.
 
     Attributes:
-        low: least deformation [mm]; less is backlash.
-        high: largest deformation [mm]; more is jam.
-        force_low: of each gear at the least one [N], shape (temperature, draw).
-        force_high: at the largest one.
-        error: by which x comes out too large [mm], shape (draw,).
+        low, high: least and largest deformation [mm].
+        force_low, force_high: of each gear there [N], (temperature, draw).
+        error: by which x comes out too large [mm], (draw,).
         least: probability of what no draw shows.
     """
 
@@ -59,10 +57,9 @@ class Spring(Kept):
 
 
 def set_points(rate: float, gap: SpringGap) -> np.ndarray:
-    """Return the interval of x in which each gear stays in the window [mm].
+    """Return the ends of the x at which each gear stays inside [mm], (2, draw).
 
-    Returns:
-        Ends of the interval, shape (2, draw); empty where the first is larger.
+    There is none where the first end is larger.
     """
     low = gap.low + np.max(gap.force_low, axis=0) / rate
     high = gap.high + np.min(gap.force_high, axis=0) / rate

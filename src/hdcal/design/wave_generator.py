@@ -4,13 +4,12 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
-from hdcal.data.case import Gear
 from hdcal.data.gear_file.validation import fault, requested, within
 from hdcal.design.charts import balance_chart
-from hdcal.design.gears import Gears, draw_gears
-from hdcal.design.request import Asked, Window, ascending, check_sizes, gears_of
+from hdcal.design.gears import calibrated_gears
+from hdcal.design.request import Asked, Window, check_sizes, gears_of
 from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
 from hdcal.design.springs import Kept, Spring, SpringGap, judge_all, kept_at
 from hdcal.errors import Finding, InputError
@@ -18,26 +17,22 @@ from hdcal.prediction.models import Models
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, quantity
 
-# Default range of the spring rate, relative to the stiffness of the gear.
+# Range of the spring rate, relative to the stiffness of the gear.
 RATE_RANGE = (0.01, 100.0)
-# A spring stands inside the gear and works over part of its length: by default its
-# free end stands no farther from the undeformed gear than this share of the radius.
+# A spring stands inside the gear and works over part of its length: its free end
+# stands no farther from the undeformed gear than this share of the radius.
 MOST_TRAVEL = 0.25
 # Points of the window at which the force has to grow with deformation.
 _ALONG = 9
-
-
-Setting = Annotated[float, within("setting_sd")]
-Rate = Annotated[float, within("rate")]
-Rates = Annotated[tuple[Rate, Rate], AfterValidator(ascending)]
 
 
 class WindowAsked(Asked):
     """The request for a wave generator; both ends of the window have one sign."""
 
     window_mm: Window = Field(validation_alias="window")
-    setting_sd_mm: Setting = Field(validation_alias="setting_sd")
-    rates_N_per_mm: Rates | None = Field(validation_alias="rates")
+    setting_sd_mm: Annotated[float, within("setting_sd")] = Field(
+        validation_alias="setting_sd"
+    )
 
     @field_validator("window_mm")
     @classmethod
@@ -92,20 +87,19 @@ class WaveGenerator(DesignResult):
 
 
 def wave_generator(
-    source: Models | Gear | Gears,
+    models: Models,
     window: tuple[float, float],
     *,
     temperatures: Sequence[float] | None = None,
     probability: float = 0.99,
     tolerances: Mapping[str, float] | None = None,
     setting_sd: float = 0.0,
-    rates: tuple[float, float] | None = None,
     seed: int = 0,
 ) -> WaveGenerator:
     """Find the softest spring with one set point that keeps gears in a window.
 
     Args:
-        source: a calibration; or a gear, to use its priors.
+        models: from `calibrate` or `diagnose`.
         window: lowest and highest deformation, radial, of the gear [mm]. At the end
             nearer to zero the teeth begin to have backlash, at the other one they jam.
             A generator that pulls has both below zero.
@@ -114,15 +108,14 @@ def wave_generator(
         probability: with which the next gear has to stay inside.
         tolerances: ± of sizes [mm] by name; sizes are uniform within them.
         setting_sd: sd of the set point as built [mm].
-        rates: spring rates to consider [N/mm]; by default 0.01 to 100 times the
-            stiffness of the gear, except those too soft to stand inside it.
         seed: of scatter and setting.
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: invalid input, or no spring rate meets the requirement.
+        InputError: invalid input, or no spring of 0.01 to 100 times the stiffness of
+            the gear meets the requirement.
     """
-    tested = draw_gears(source, seed)
+    tested = calibrated_gears(models, seed)
     asked = requested(
         WindowAsked,
         tested,
@@ -131,7 +124,6 @@ def wave_generator(
         probability=probability,
         tolerances=dict(tolerances or {}),
         setting_sd=setting_sd,
-        rates=rates,
     )
     gears = tested.next_ones(asked.tolerances_mm, seed, asked.sense)
     low, high = sorted(map(abs, asked.window_mm))
@@ -139,13 +131,11 @@ def wave_generator(
     place = np.repeat(along, len(levels)), np.tile(levels, _ALONG)
     forces = gears.forces(*place, gears.factor({})).reshape(_ALONG, len(levels), -1)
     _require_growing(forces)
-    error = np.random.default_rng([seed, 1]).normal(size=gears.size)
+    error = np.random.default_rng([seed, 1]).normal(size=gears.model.size)
     error, least = asked.setting_sd_mm * error, 0.5 / gears.independent
-    gap, middle = (
-        SpringGap(low, high, forces[0], forces[-1], error, least),
-        forces[_ALONG // 2],
-    )
-    rates = rates or _usual_rates(gap, middle, float(gears.gear.geometry.radius))
+    gap = SpringGap(low, high, forces[0], forces[-1], error, least)
+    middle, radius = forces[_ALONG // 2], float(gears.gear.geometry.radius)
+    rates = _usual_rates(gap, middle, radius)
     springs, chosen = judge_all(rates, gap, asked.probability)
     if chosen is None:
         raise InputError([_unmet(springs, asked.probability)])
@@ -156,7 +146,6 @@ def wave_generator(
 
     return WaveGenerator(
         **shared_fields(gears, asked.window_mm, levels, {}),
-        materials=(gears.material,),
         asked=asked,
         spring=mirrored(chosen),
         springs=tuple(map(mirrored, springs)),

@@ -72,11 +72,7 @@ class DynamicProblem(Sampled):
 
 
 def dynamic_site_priors(case: Case, theory: Theory) -> dict[str, Prior]:
-    """Return the priors of all parameters.
-
-    Raises:
-        InputError: the moved mass has none.
-    """
+    """Return the priors of all parameters; `mass_prior` raises its error."""
     gear = case.gear
     table = {**gear.priors, **gear.dynamic_priors, **gear.gauge_priors}
     table["mass"] = mass_prior(gear, case_reading(case).radial_per_read)

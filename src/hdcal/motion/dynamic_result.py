@@ -35,8 +35,8 @@ _TAILS, _ROWS = (0.025, 0.5, 0.975), 10_000
 class DynamicCalibration(PosteriorResult):
     """What `hdcal calibrate --dynamic` answers; summary.json.
 
-    Damping and frequencies are at the mean temperature of the test; `bands` is the
-    record with 95 % bands of the model, a row per reading.
+    Damping and frequencies are at the mean temperature of the test; `bands` has a row
+    per reading.
     """
 
     template = "motion/dynamic.md.j2"
@@ -79,12 +79,7 @@ def dynamic_calibration_of(posterior: DynamicPosterior) -> DynamicCalibration:
 
 
 def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> pd.DataFrame:
-    """Return the record with equal-tailed 95 % bands, a row per reading.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-        seed: of the noise of new readings.
-    """
+    """Return the record with equal-tailed 95 % bands, a row per reading."""
     problem, draws = posterior.moving, posterior.draws
     count = int(np.clip(_MOST_NUMBERS // problem.count, _FEWEST, _DRAWS))
     rows = np.linspace(0, len(draws["mass"]) - 1, count).astype(int)

@@ -31,12 +31,7 @@ _CHUNK, _MOST_STATES = 250, 1_000_000
 
 
 def moving_draws(gears: JointModel, seed: int) -> dict[str, np.ndarray]:
-    """Return the draws of one gear, of one calibrated at rest with its leftover.
-
-    Args:
-        gears: the models of the gear.
-        seed: of the bend.
-    """
+    """Return the draws of one gear, of one calibrated at rest with its leftover."""
     # Values of tested members may be many, and are no part of a gear in motion.
     values = {n: v for n, v in gears.draws.items() if n not in MEMBERS.values()}
     if gears.posterior.kind == "dynamic":
@@ -79,14 +74,7 @@ def integrate_all(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the deformation of every draw, (draw, n), and its largest size [mm].
 
-    Args:
-        gears: the models of the gear.
-        values: from `moving_draws`.
-        mass: of each draw [N·s²/mm].
-        damping: of each draw [N·s/mm].
-        force: over time.
-        times: of the answer [s], (n,).
-        temperature: of the gear [°C].
+    Mass [N·s²/mm] and damping [N·s/mm] have one value for each draw of `moving_draws`.
 
     Raises:
         NotUsable: a gear gives way, or a motion could not be integrated.

@@ -84,10 +84,7 @@ class Conditions:
         return np.where(self.unloading, -self.loading, self.loading)
 
     def turn(self, records: Records) -> np.ndarray:
-        """Return where unloading begins [mm], (n,).
-
-        At the largest tested deformation, or here where that is larger.
-        """
+        """Return where unloading begins [mm]: as far as was tested, or here."""
         tested = np.where(
             self.loading > 0.0,
             np.max(records.deformation),
@@ -187,13 +184,7 @@ def far_findings(
 
 
 def excluded_findings(case: Case, deformation: float, sense: float) -> list[Finding]:
-    """Return a finding where rows were read and left out, or the part had given way.
-
-    Args:
-        case: that was calibrated.
-        deformation: as given [mm].
-        sense: sign of the movement as read.
-    """
+    """Return a finding where rows were left out: at a deformation, or in a sense."""
     if case.excluded_sense and sense == case.excluded_sense:
         way = "rises" if sense > 0.0 else "falls"
         words = f"readings while the {case.units.displacement} {way} were left out, as "

@@ -42,12 +42,11 @@ class Bend:
         end: towards which it grows [mm].
         far: the other end [mm].
         knots: places with residuals, 0 at the far end and 1 at the end, (k,).
-        line: weights of the residuals in the line that offset and stiffness absorb,
-            (2, k).
+        line: weights of the residuals in the line of offset and stiffness, (2, k).
         axes: directions of the residuals that no line absorbs, (k, m).
         found: the residuals along these directions [N], (m,).
         size: of the bend under each law [N], (g,).
-        variance: variance along each direction under each law [N²], (m, g).
+        variance: along each direction under each law [N²], (m, g).
         chances: probability of each law, (g,).
     """
 
@@ -74,11 +73,7 @@ class Bend:
         return -np.expm1(-(over**2))
 
     def law(self, deformation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and sd of the bend under each law [N], (g, n) each.
-
-        Args:
-            deformation: as read [mm], shape (n,).
-        """
+        """Return mean and sd of the bend under each law at places [N], (g, n) each."""
         at = np.maximum(self.place(deformation), 0.0)
         lines = np.stack([np.ones_like(at), at], axis=1) @ self.line
         to_knots = covariance(at, self.knots)
@@ -96,9 +91,7 @@ class Bend:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and sd of the bend of each draw [N], (d, n) each.
 
-        Args:
-            deformation: as read [mm], shape (n,).
-            level: selects a law by its probability, between 0 and 1, (d,).
+        A level between 0 and 1 selects the law of a draw by its probability, (d,).
         """
         mean, sd = self.law(deformation)
         law = np.searchsorted(np.cumsum(self.chances)[:-1], level)
@@ -106,11 +99,7 @@ class Bend:
 
 
 def fit_bends(posterior: Posterior) -> tuple[Bend, Bend]:
-    """Return the bends towards the low and the high end of the tested deformation.
-
-    Args:
-        posterior: whose model leaves residuals of the tested rows.
-    """
+    """Return the bends towards the low and the high end of the tested deformation."""
     records = posterior.case.records
     middle = {name: values.mean(axis=0) for name, values in posterior.draws.items()}
     middle.pop("gap_weights", None)
@@ -160,12 +149,9 @@ def _fitted(end: float, far: float, deformation, residual, weight, change) -> Be
 
 
 def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.ndarray:
-    """Return the covariance of a bend of size 1 between places.
+    """Return the covariance of a bend of size 1 between places (k,) and (n,).
 
-    Args:
-        one: places, (k,).
-        other: places, (n,).
-        pairs: between all pairs, (k, n); or else of the i-th with the i-th, (k,).
+    Between all pairs, (k, n), or of the i-th with the i-th, (k,).
     """
     one = one[:, None] if pairs else one
     low, high = np.minimum(one, other), np.maximum(one, other)

@@ -32,13 +32,9 @@ _STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"forc
 def grid_records(deformation, temperature, sense, known_sd, gear=None) -> Records:
     """Return rows that were not measured: immediate readings after a reset.
 
-    Args:
-        deformation: as read [mm], shape (n,).
-        temperature: of the specimen [°C], shape (n,).
-        sense: +1 where the deformation rises, -1 where it falls, shape (n,).
-        known_sd: known measurement sd of a row [N].
-        gear: index of the gear of a row, each in a mounting of its own, shape (n,); by
-            default each row is of another gear, without memory of the other rows.
+    Deformation as read [mm], temperature [°C], sense of the movement (±1): (n,). Each
+    row is of a gear of its own, without memory of other rows, unless `gear` numbers
+    them.
     """
     zeros = np.zeros(len(deformation))
     index = np.arange(len(deformation)) if gear is None else gear
@@ -67,7 +63,7 @@ def force_of(
     moved: Float[Array, "*n"] | float = 0.0,
     quantity: Quantity | Literal["gear"] = "reading",
 ) -> tuple[Float[Array, " n"], Noise]:
-    """Compute mean force and noise of one draw, without the leftover discrepancy.
+    """Compute mean force and noise [N] of one draw, without the leftover discrepancy.
 
     Args:
         problem: structure.
@@ -79,9 +75,6 @@ def force_of(
         quantity: `reading` has the zero of the force and the effects of the sensor;
             `load` lacks them and the gain of the gauge; `gear` also lacks the zero of
             the deformation and the compliance of the rig.
-
-    Returns:
-        Mean force [N], and the noise of a reading of it.
     """
     effects = build_effects(problem, values)
     base = member_base(problem, values)
@@ -116,15 +109,15 @@ def forces_of_draws(
     Args:
         problem: structure.
         draws: parameters by site: [draw, …].
-        path: rows that lead to the conditions; the last ones are the conditions.
+        path: rows that lead to the conditions, which are the last ones.
         factor: on the stiffness at each row of the path [-].
-        moved: radial deformation that the frame gains at each row of the path [mm].
+        moved: radial deformation that the frame gains at each row [mm].
         leftover: share of the fitted leftover discrepancy that acts.
         quantity: which force.
         asked: number of conditions.
 
     Returns:
-        Force (draw, node, asked) [N], its derivative by the factor [N], logarithms of
+        Force (draw, node, asked) and its derivative by the factor [N], logarithms of
         the shares of the components of the noise (draw, node, component), their sds
         (draw, node, component, asked) [N], and the leftover discrepancy in the force
         (draw, asked) [N].
@@ -154,15 +147,10 @@ def forces_of_draws(
 def fitted_leftover(
     problem: Problem, value: Values, rows: Records, quantity
 ) -> Float[Array, " n"]:
-    """Return the fitted leftover discrepancy of one draw [N].
+    """Return the fitted leftover discrepancy of one draw [N], zero without one.
 
-    It is constant beyond the tested deformation.
-
-    Args:
-        problem: structure; without a leftover the result is zero.
-        value: one draw.
-        rows: of which deformation and sense are used.
-        quantity: which force; that of a gear is counted from its free shape.
+    It is constant beyond the tested deformation; that of a gear is counted from its
+    free shape.
     """
     fitted = problem.discrepancy
     if fitted is None or "gap_weights" not in value:

@@ -94,8 +94,7 @@ class JointModel:
     def _joined(self, site: str, nulls: dict[str, float]) -> np.ndarray:
         """Return the draws of a site; of a model without it at its null.
 
-        The shape of an effect that a model lacks does not matter, so that it has the
-        values of a model with it.
+        The shape of an effect that a model lacks does not matter.
         """
         first = next(m.draws[site] for m in self.models if site in m.draws)
         parts = []
@@ -166,13 +165,9 @@ def joint(
     """Return models as one.
 
     Args:
-        models: as in `models_of`.
+        models: as in `models_of`, which raises its errors.
         most: draws to take, evenly from every chain; all by default.
         allow_failed: also calibrations that failed their checks.
-
-    Raises:
-        NotUsable: a calibration failed its checks.
-        InputError: there are none, or they are not of the same data.
     """
     return join(models_of(models, allow_failed=allow_failed), most)
 

@@ -89,12 +89,7 @@ class Members:
 
 
 def one_member(members: Members, more_sd: float = 0.0) -> Members:
-    """Return one member over all draws, as one draw.
-
-    Args:
-        members: of many draws.
-        more_sd: of what is added to each, such as rounding [N].
-    """
+    """Return one member over all draws, as one draw, with more scatter [N]."""
     draws, rows, _ = members.mean.shape
 
     def flat(values: np.ndarray) -> np.ndarray:

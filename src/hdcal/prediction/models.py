@@ -170,29 +170,21 @@ def left_out_of(models: Models) -> float:
 
 def averaging_words(models: Models) -> list[str]:
     """Return sentences on the hypotheses of an average and on those left out."""
-    found, words = models_of(models, allow_failed=True), []
+    found, sentences = models_of(models, allow_failed=True), []
     if len(found) > 1:
         each = probabilities(found).items()
         listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in each)
-        words.append(f"This averages over the causes that are left: {listed}.")
+        sentences.append(f"This averages over the causes that are left: {listed}.")
     missing: LeftOut | None = getattr(models, "left_out", None)
     if missing is not None and missing.probability > _ROUNDING:
-        words.append(
-            f"{percent(missing.probability)} of the probability lies on hypotheses "
-            "that were not calibrated; it counts as "
-            f"{hypothesis(missing.counted_as)}."
-        )
-    return words
+        words = f"{percent(missing.probability)} of the probability lies on hypotheses "
+        words += "that were not calibrated; it counts as "
+        sentences.append(f"{words}{hypothesis(missing.counted_as)}.")
+    return sentences
 
 
 def joint_draws(models: Sequence[Model], site: str, count: int = 4000) -> np.ndarray:
-    """Return draws of a parameter over all models, (count,), each by its weight.
-
-    Args:
-        models: with their probabilities.
-        site: of every model.
-        count: number of draws.
-    """
+    """Return draws of a parameter over all models, (count,), each by its weight."""
     values = np.concatenate([model.draws[site] for model in models])
     weights = [np.full(model.size, model.probability / model.size) for model in models]
     ends = np.cumsum(np.concatenate(weights))

@@ -17,10 +17,7 @@ def share_findings(
 ) -> list[Finding]:
     """Return findings for values that are no probabilities or cannot be resolved.
 
-    Args:
-        shares: by name; `confidence` is a share of the draws.
-        draws: of what is not known.
-        more: how there would be more of them, after what can be asked.
+    Of a `confidence` so many draws must lie beyond; `more` follows what can be asked.
     """
     findings = [f for name, value in shares.items() for f in implausible(name, value)]
     if findings:

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.data.records import Records
-from hdcal.inference.force_model.values import Values
 from hdcal.prediction.conditions import Conditions, Population, usual_sd
 from hdcal.prediction.forces import forces_of_draws, grid_records
 from hdcal.prediction.joint import DRIFTS, JointModel
@@ -99,25 +98,17 @@ def simulate(
     )
 
 
-def gear_forces(
-    model: JointModel, at: Conditions, draws: Values | None = None, *, seed: int = 0
-) -> np.ndarray:
+def gear_forces(model: JointModel, at: Conditions, *, seed: int = 0) -> np.ndarray:
     """Return the force of every draw on gears by themselves [N], (draw, row).
 
     Each row is another gear, loaded from its free shape, without zeros, errors and
-    drifts of a rig.
-
-    Args:
-        model: whose draws are simulated.
-        at: with the quantity `gear`, and a factor on the stiffness where sizes or
-            modulus are not the tested ones, (row,) or (draw, row).
-        draws: other values of the parameters, such as those of another material.
-        seed: of the scores of what the draws leave open.
+    drifts of a rig. A factor on the stiffness, where sizes are not the tested ones, is
+    (row,) or (draw, row).
     """
     bend, acting = _bend(model, at, draw_scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
     moved = np.zeros((model.size, at.size))
-    return _forces(model, at, factor, moved, acting, draws)[0][:, 0] + bend
+    return _forces(model, at, factor, moved, acting)[0][:, 0] + bend
 
 
 def gear_leftover(
@@ -125,12 +116,8 @@ def gear_leftover(
 ) -> np.ndarray:
     """Return the force of a gear outside model and effects [N], (draw, row).
 
-    The bend, and the fitted leftover as the mean of loading and unloading.
-
-    Args:
-        model: whose draws are simulated.
-        deformation: from the free shape, per mm as read, (row,).
-        seed: of the scores of what the draws leave open.
+    The bend, and the fitted leftover as the mean of loading and unloading, by the
+    deformation from the free shape, per mm as read, (row,).
     """
     score, case = draw_scores(model.size, seed), model.posterior.case
     warm, tested = case.gear.reference_temperature, case.records.deformation
@@ -147,14 +134,14 @@ def gear_leftover(
 
 
 def _forces(
-    model: JointModel, at: Conditions, factor, moved, acting, draws=None
+    model: JointModel, at: Conditions, factor, moved, acting
 ) -> tuple[np.ndarray, ...]:
     """Return what `forces_of_draws` does."""
     path = _path(at, model.posterior.case.records)
     repeats = len(path.deformation) // at.size
     found = forces_of_draws(
         model.problem,
-        model.draws if draws is None else draws,
+        model.draws,
         path,
         np.tile(factor, repeats),
         np.tile(moved, repeats),
@@ -185,7 +172,7 @@ def _path(at: Conditions, records: Records) -> Records:
 
 @lru_cache(maxsize=8)
 def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
-    """Return scores of each draw by Latin hypercube sampling: evenly, in random order.
+    """Return scores of each draw by Latin hypercube sampling.
 
     Standard normal, but for `law`, which lies between 0 and 1.
     """

@@ -71,13 +71,9 @@ def size_nodes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return factors on the stiffness by the sizes of a gear, and their shares.
 
-    Each size is uniform within its tolerance: only limits are known (JCGM 100:2008,
-    4.3.7). The nodes are those of Gauss and Legendre on the quantiles of the factor.
-
-    Args:
-        geometry: nominal.
-        tolerances: ± by field [mm].
-        theory: of the stiffness.
+    Each size is uniform within its tolerance, ± by field [mm]: only limits are known
+    (JCGM 100:2008, 4.3.7). The nodes are those of Gauss and Legendre on the quantiles
+    of the factor.
     """
     if not tolerances:
         return np.ones(1), np.ones(1)

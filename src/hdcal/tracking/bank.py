@@ -110,7 +110,7 @@ class Bank(eqx.Module):
 
 @jax.jit
 def follow_rows(bank: Bank, rows: dict[str, Any], count: int):
-    """Take rows in their order.
+    """Take rows in their order; return the bank after them, and FIELDS of each row.
 
     Args:
         bank: before the rows.
@@ -118,9 +118,6 @@ def follow_rows(bank: Bank, rows: dict[str, Any], count: int):
             `follows` the one before, so that their noise may be correlated, and is
             `remounted`; the `cell` of its force. Each has the rows as its first axis.
         count: of the rows; others are padding.
-
-    Returns:
-        The bank after them, and FIELDS of each row.
     """
 
     def step(i, carry):
@@ -218,10 +215,8 @@ def _rounding_weight(bank: Bank, cell):
     With noise of sd σ below half of the step q an error of rounding repeats with the
     force, with variance q²/12 exp(−4π² σ²/q²) (first harmonic of the error). Then k
     readings of a force say as much as one of variance b² + s²/k, where b² + s² is the
-    variance of a reading.
-
-    Returns:
-        The share, the part of the variance that repeats, and the new counts.
+    variance of a reading. Also returned: the part b² of the variance, and the new
+    counts.
     """
     if bank.counts.size == 0:
         return jnp.ones(()), jnp.zeros(()), bank.counts

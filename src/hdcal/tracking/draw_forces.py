@@ -86,12 +86,7 @@ class StreamDraws:
         return replace(self, model=model, values=values, scores=scores, bend=bend)
 
     def at(self, deformation, temperature) -> RowForces:
-        """Return the readings that the draws expect.
-
-        Args:
-            deformation: as read, shape (n,) [mm].
-            temperature: of the specimen, shape (n,) [°C].
-        """
+        """Return what the draws expect at deformations [mm] and temperatures [°C]."""
         model, level = self.model, self.bend[:, 0]
         records = model.posterior.case.records
         low, high = np.min(records.deformation), np.max(records.deformation)

@@ -19,12 +19,7 @@ _PAIRS = 30.0
 
 
 def first_bank(every: StreamDraws, threshold: float) -> tuple[StreamDraws, Bank]:
-    """Return some of the draws, and what they know of a stream.
-
-    Args:
-        every: all draws; of several gears, for a new one.
-        threshold: of the change alarm [-].
-    """
+    """Return some of the draws, and what they know of a stream."""
     number, problem = every.model.number, every.model.problem
     rows = np.flatnonzero(np.bincount(number)[number] >= _PER_COEFFICIENT)
     rows = rows[np.linspace(0, len(rows) - 1, DRAWS).astype(int)]

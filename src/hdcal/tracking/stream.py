@@ -26,10 +26,8 @@ _REQUIRED, _OTHERS = ("deformation", "force"), ("temperature", "run")
 def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
     """Answer every line that is not blank, as soon as it is there.
 
-    The source holds JSON objects, or a header row and lines of CSV.
-
-    Returns:
-        Number of lines that were no reading.
+    The source holds JSON objects, or a header row and lines of CSV. The number of lines
+    that were no reading is returned.
     """
     bad, of_json, of_table, first = 0, json_reader(tracker.units), None, True
     for lines in _blocks(source):

@@ -101,10 +101,7 @@ def branch_marks(
 ) -> Iterator[Mark]:
     """Yield bands and medians of one temperature and direction.
 
-    Args:
-        bands: of any number of branches.
-        branch: which one.
-        around_model: as distances from the model without the bend, without labels.
+    Around the model: as distances from it without the bend, and without labels.
     """
     rows, colour = branch.rows, branch.colour
     x, tested = bands.deformation_mm[rows], np.asarray(bands.tested[rows], bool)

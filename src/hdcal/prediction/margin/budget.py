@@ -50,9 +50,7 @@ _TYPE_A = {"stiffness", "bend", "K"}
 class BudgetRow(Item):
     """One component of the uncertainty; the shares of all rows sum to 1.
 
-    Attributes:
-        type_: A where the readings determine it, B by other knowledge (JCGM 100).
-        sensitivity_N_per_unit: slope of the force by the input.
+    Type A where the readings determine it, B by other knowledge (JCGM 100).
     """
 
     component: Words = quantity("component")
@@ -104,11 +102,7 @@ def budget(
 ) -> tuple[tuple[BudgetRow, ...], float, float]:
     """Return the rows of the budget, the estimate and its standard uncertainty [N].
 
-    Args:
-        model: of the members.
-        members: at one condition.
-        rounding_sd: sd of the rounding of a reading [N].
-        direction: of loading; the estimate has the sign of the force.
+    The members are at one condition; the estimate has the sign of the force.
     """
     centre = members.centre[:, 0]
     estimate = float(centre.mean())

@@ -29,17 +29,11 @@ class Conformity(Item):
 def decide(
     rule: Rule, limit: float, estimate: float, low: float, high: float, risk: float
 ) -> Conformity:
-    """Return the decision.
+    """Return the decision; all numbers are sizes along the loading [N].
 
-    Args:
-        rule: guarded accepts an estimate if the whole coverage interval keeps the
-            limit, and rejects it if none of the interval does; simple compares the
-            estimate alone.
-        limit: that must not be exceeded [N].
-        estimate: of one member [N].
-        low: lower end of its coverage interval [N].
-        high: upper end [N].
-        risk: probability that one member exceeds the limit.
+    Guarded accepts an estimate if the whole coverage interval keeps the limit, and
+    rejects it if none of the interval does; simple compares the estimate alone. The
+    risk is the probability that one member exceeds the limit.
     """
     least, most = (low, high) if rule == "guarded" else (estimate, estimate)
     rejected = "does not conform" if least > limit else "undecided"

@@ -70,11 +70,8 @@ def force_levels(
 ) -> tuple[Level, ...]:
     """Return the force at each temperature.
 
-    Args:
-        model: of the members.
-        asked: the request.
-        members: one row for each temperature.
-        step: of a reading, 0 for a load [N].
+    The members have one row for each temperature; the step of a reading [N] is 0 for a
+    load.
     """
     sign, half, sure = asked.loading_sense, 0.5 * step, asked.confidence
     most, least = (members.quantile(p) for p in (asked.content, 1.0 - asked.content))

@@ -46,16 +46,10 @@ class Reached(Item):
 def deformation_reached(
     models: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
 ) -> Reached | None:
-    """Return the deformation at which the members first need the given force.
+    """Return the deformation at which the members first need the given force, if any.
 
     The share of the members that gets beyond a deformation is the share that needs less
     there. A member reaches the first deformation at which it needs the force.
-
-    Args:
-        models: over which the answer averages.
-        asked: with the given force; without one there is no answer.
-        at: conditions of the margin.
-        warm: temperature of the answer [°C].
     """
     force, model = asked.given_force_N, join(models, _DRAWS)
     if force is None:
@@ -108,16 +102,9 @@ def deformation_reached(
 
 
 def first_crossing(curve: np.ndarray, needed: float, places: np.ndarray) -> np.ndarray:
-    """Return where each curve first reaches a value, by linear interpolation.
+    """Return where each curve (draw, place) first reaches a value, by interpolation.
 
-    Args:
-        curve: of each draw at the places, (draw, place).
-        needed: the value.
-        places: ascending, (place,).
-
-    Returns:
-        Shape (draw,): infinite where it is never reached, -infinite where the first
-        place is beyond it already.
+    Infinite where it is never reached, -infinite where the first place is beyond it.
     """
     passed = curve >= needed
     after = np.maximum(np.argmax(passed, axis=1), 1)
