@@ -19,6 +19,8 @@ def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
     rows.noise[0] *= np.exp(0.1 * odd.get("noise", 0.0))
     rows.loop[0] += 0.1 * odd.get("loop", 0.0)
     rows.bend[0] += 0.1 * odd.get("bend", 0.0)
+    rows.gain = np.zeros((gears, 2))
+    rows.gain[0, 1] = odd.get("other_part", 0.0)
     return fit_population(rows.readings(rng), Sampling(seed=seed))
 
 
@@ -41,6 +43,10 @@ def test_an_odd_gear_is_flagged_in_its_quantity_alone(quantity: str, size: float
     expected = {name: [] for name in QUANTITIES} | {quantity: [0]}
     assert flagged(found) == expected
     assert not [one for one in found.checks if one.outcome == "failed"]
+
+
+def test_a_mounting_of_another_part_shows_in_the_noise():
+    assert 0 in flagged(fitted(12, 3, other_part=0.1))["noise"]
 
 
 def test_a_gear_far_off_changes_no_other_gear():

@@ -200,8 +200,7 @@ def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
     """Return the sd of a new lot, operator or rig about the mean of those measured.
 
-    This mean has an error itself: the sd of one group over the root of their number.
-    The result is zero without such groups.
+    It includes the error of this mean, and is zero without such groups.
     """
     if f"{kind}_sd" not in draws:
         return np.zeros(1)

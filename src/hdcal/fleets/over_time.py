@@ -36,16 +36,12 @@ class Change(Item):
         what: stiffness of gears about the centre of their lot, zero of the mountings of
             a gear on one day about that of their operator, or noise of gears.
         dates: number of dates.
-        probability_changed: that it changes at all, 0.5 before the data.
-        changed: whether that is 0.95 or more.
-        ways: probability of steps, of a steady drift, and of levels that differ from
-            day to day.
-        steps: if there are steps.
+        probability_changed: that it changes at all, 0.5 before the data; from 0.95 on
+            it is `changed`.
         drift: from the first date to the last, if it is steady.
-        days_sd: sd of the days, if they differ.
+        days_sd: sd of the levels of days, if they differ from day to day.
         left_out: flagged gears between others, which are no change.
-        values: gear, day, value about the median, sd of its error and whether it is
-            left out, in the order of the dates.
+        values: gear, day, value about the median, sd of its error, left_out.
     """
 
     what: Literal["stiffness", "zero", "noise"]

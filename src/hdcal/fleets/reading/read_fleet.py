@@ -35,14 +35,11 @@ def read_fleet(
     data: Any,
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
-    columns: Mapping[str, str] | None = None,
-    theory: str | None = None,
-    reading: str | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     specimen: str | None = None,
     scheduler: str | None = None,
-    range: str | None = None,
+    **how: Any,
 ) -> FleetReadings:
     """Return the readings of many gears; gears with a fault are named in its `faults`.
 
@@ -51,21 +48,16 @@ def read_fleet(
             folder with a file or a case for each gear; a Parquet file, or a folder of
             them, which are read in batches.
         gear: as in `read_case`, as are all that follow; a case has its own.
-        columns: quantity -> header.
-        theory: overrides that of the gear file.
-        reading: of the deformation.
         encoding: of text files.
         sheet: of a workbook.
         specimen: label of the only one that is read.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
-        range: working range.
+        how: columns, theory, reading and range.
 
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    how: dict = {"columns": columns, "theory": theory, "reading": reading}
-    how |= {"range": range}
     if is_parquet(data):
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
         return _with_faults(found, sums.left_out, sums.observed)
