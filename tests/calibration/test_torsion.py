@@ -12,8 +12,7 @@ from hdcal.calibration.calibration import calibration_of
 from hdcal.calibration.check.check import check
 from hdcal.cli.option_types import read_quantity, unit_findings
 from hdcal.errors import InputError
-from hdcal.fleets.reading.read_fleet import read_fleet
-from hdcal.fleets.reading.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.quantities import FORCE, TORQUE
 
 STIFFNESS = 9000.0  # [N·m/rad]

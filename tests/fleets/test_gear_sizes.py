@@ -7,8 +7,7 @@ from gear_records import SIZES, records, refused
 
 from hdcal.data.reading import read_case
 from hdcal.fleets.reading.gear_sizes import gear_sizes
-from hdcal.fleets.reading.read_fleet import read_fleet
-from hdcal.fleets.reading.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
 
 WALLS = 0.68 * np.linspace(0.9, 1.1, 8)
 TABLE = pd.DataFrame(

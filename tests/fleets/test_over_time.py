@@ -7,6 +7,7 @@ from handmade_fleet import fitted
 
 import hdcal
 from hdcal.errors import Finding
+from hdcal.fleets import over_time as times
 from hdcal.fleets.over_time import Change, over_time
 from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 
@@ -71,6 +72,14 @@ def test_a_step_is_reported_of_what_changes_only(change, what, size, side):
     assert found[what].likeliest == "steps"
     assert step.after <= "2026-03-10" < "2026-03-11" <= step.before
     assert step.size.lo < size < step.size.hi
+
+
+def test_more_dates_than_are_distinguished_are_grouped(monkeypatch):
+    monkeypatch.setattr(times, "_MOST_DATES", 7)
+    one = changes(measured(stiffness=-0.04))["stiffness"]
+    assert (one.dates, one.first, one.last) == (DAYS, "2026-03-01", "2026-03-20")
+    (step,) = one.steps
+    assert step.after <= "2026-03-10" < "2026-03-11" <= step.before
 
 
 def test_a_drift_is_reported():

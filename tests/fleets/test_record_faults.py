@@ -6,9 +6,8 @@ import pytest
 from gear_records import records, refused
 
 from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.fleets.reading.record_faults import irregular
-from hdcal.fleets.reading.usable import usable
 
 ODD = "G3"
 
@@ -45,10 +44,6 @@ def one_place(x, force):
     x[:] = 0.3
 
 
-def at_zero(x, force):
-    x[:] = 0.0
-
-
 FAULTS = [
     (jump, "jump of the force"),
     (broken, "drop of the force for good"),
@@ -58,7 +53,6 @@ FAULTS = [
     (dead, "does not grow"),
     (opposite, "falls as the deformation grows"),
     (one_place, "one deformation only"),
-    (at_zero, "one deformation only"),
 ]
 
 

@@ -109,11 +109,9 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         if name in shapes:
             problem, start = problems.shape(fits, name, largest_force)
             values = populations.sample(name, problem, start, _AVERAGED)
-            each: Any = pd.Series(getattr(fits, name))
-            sizes = each.groupby(fits.gear).mean()
+            sizes: Any = pd.Series(getattr(fits, name)).groupby(fits.gear).mean()
             table[f"{name}_N"] = sizes.reindex(range(gears)).to_numpy()
             table[f"off_{name}"] = _odd(problem, values, seed)
-    settings = {n: getattr(sampling, n) for n in ("seed", "chains", "warmup", "draws")}
     return FittedFleet(
         draws=populations.draws,
         gears=pd.DataFrame(table),
@@ -122,7 +120,7 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         fits=fits,
         unit=unit,
         checks=tuple(populations.checks),
-        settings=settings,
+        settings=sampling.settings,
     )
 
 

@@ -42,6 +42,12 @@ class Sampling:
     seed: int = 0
     progress: Progress | None = None
 
+    @property
+    def settings(self) -> dict[str, int]:
+        """Settings that a result states."""
+        names = ("seed", "chains", "warmup", "draws")
+        return {name: getattr(self, name) for name in names}
+
 
 class Populations:
     """Draws by site and checks of the populations of a fleet that were sampled so far.
