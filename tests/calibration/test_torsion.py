@@ -11,8 +11,7 @@ import hdcal
 from hdcal.calibration.calibration import calibration_of
 from hdcal.calibration.check.check import check
 from hdcal.errors import InputError
-from hdcal.fleets.reading.read_fleet import read_fleet
-from hdcal.fleets.reading.usable import usable
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.quantities import TORQUE
 
 STIFFNESS = 9000.0  # [N·m/rad]

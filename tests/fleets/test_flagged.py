@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from gear_records import records
 from gear_rows import ordinary
 from scipy.stats import binomtest
 
 from hdcal.fleets.gear_table import QUANTITIES
 from hdcal.fleets.model.population import FittedFleet, fit_population
 from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.reading.read_fleet import read_fleet
 
 
 def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
@@ -19,6 +21,8 @@ def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
     rows.noise[0] *= np.exp(0.1 * odd.get("noise", 0.0))
     rows.loop[0] += 0.1 * odd.get("loop", 0.0)
     rows.bend[0] += 0.1 * odd.get("bend", 0.0)
+    rows.gain = np.zeros((gears, 2))
+    rows.gain[0, 1] = odd.get("other_part", 0.0)
     return fit_population(rows.readings(rng), Sampling(seed=seed))
 
 
@@ -41,6 +45,18 @@ def test_an_odd_gear_is_flagged_in_its_quantity_alone(quantity: str, size: float
     expected = {name: [] for name in QUANTITIES} | {quantity: [0]}
     assert flagged(found) == expected
     assert not [one for one in found.checks if one.outcome == "failed"]
+
+
+def test_progress_reaches_its_end_without_a_loop():
+    steps = []
+    readings = read_fleet(records(gears=4, runs=1))
+    sampling = Sampling(progress=lambda done, every: steps.append(done / every))
+    assert "loop" not in fit_population(readings, sampling).draws
+    assert steps == sorted(steps) and steps[-1] == 1.0
+
+
+def test_a_mounting_of_another_part_shows_in_the_noise():
+    assert 0 in flagged(fitted(12, 3, other_part=0.1))["noise"]
 
 
 def test_a_gear_far_off_changes_no_other_gear():

@@ -15,7 +15,7 @@ from schema_checks import obeys
 
 import hdcal
 from hdcal.data.prior import Prior
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding
 from hdcal.fleets.fleet import fleet_of
 from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.fleets.result import Fleet
@@ -53,23 +53,6 @@ def test_the_odd_gear_is_named_first_and_in_the_table():
     assert quiet.false_discovery_rate is None and quiet.next_step is None
 
 
-@pytest.mark.parametrize(
-    ("scale", "words"),
-    [
-        (1e-6, "D has < 1 % of the stiffness of the others"),
-        (0.25, "D has 25 % of the stiffness of the others"),
-        (8.0, "D is 8 times as stiff as the others"),
-    ],
-)
-def test_a_broken_gear_is_described_in_plain_numbers(scale: float, words: str):
-    readings = four_gears()
-    fit = fitted(readings, {"D": ["stiffness"]})
-    row = fit.gears.index[3]
-    for name in ("apart_percent", "apart_lo", "apart_hi"):
-        fit.gears.loc[row, name] = 100.0 * (scale - 1.0)
-    assert words in fleet_of(readings, fit).headline
-
-
 def test_several_quantities_are_said_of_one_gear():
     odd = {"A": ["zero", "noise"], "B": ["noise"], "C": ["zero"], "D": ["stiffness"]}
     fleet = of(four_gears(), odd)
@@ -78,6 +61,13 @@ def test_several_quantities_are_said_of_one_gear():
     assert fleet.headline.endswith("1 more is flagged.")
     assert "--specimen A" in str(fleet.next_step)
     assert fleet.alike == 3
+    fit = fitted(four_gears(), {"D": ["stiffness"]})
+    names = ["apart_percent", "apart_lo", "apart_hi"]
+    fit.gears.loc[fit.gears.index[3], names] = -75.0
+    assert (
+        "D has 25 % of the stiffness of the others"
+        in fleet_of(four_gears(), fit).headline
+    )
 
 
 def test_lots_operators_and_rigs_are_in_the_answer():
@@ -93,11 +83,9 @@ def test_lots_operators_and_rigs_are_in_the_answer():
     assert "softer than its lot" in fleet.headline
     assert fleet.to_frame()["lot"].tolist() == ["low", "low", "high", "high"]
     sources = {source: force for source, _, _, force in fleet.scatter}
-    assert len(sources) == 6
     # One percent of 0.5 mm of some 200 N/mm.
-    assert sources["gears"] == pytest.approx(1.0, rel=0.02)
-    assert sources["single readings"] == 1.0
-    assert not fleet.rigs_are_linked and len(fleet.notes) > len(handmade().notes)
+    assert len(sources) == 6 and sources["gears"] == pytest.approx(1.0, rel=0.02)
+    assert not fleet.linked and len(fleet.notes) > len(handmade().notes)
     many = of(with_case(rigs=tuple("ABCD")))
     assert many.rigs == () and any("4 rigs" in note for note in many.notes)
 
@@ -129,17 +117,9 @@ def test_gears_of_several_sizes_keep_their_stiffness_in_the_table():
     assert abs(frame["apart_percent"][3]) < 0.5
 
 
-def test_the_gauge_is_that_of_the_deformation_asked_for():
-    alone, asked = handmade(), handmade(deformation=0.2, force_tolerance=50.0)
-    assert alone.gauge_rr.deformation_mm == 0.5
-    assert asked.gauge_rr.deformation_mm == 0.2
-    gears = asked.gauge_rr.gears_N.median / alone.gauge_rr.gears_N.median
-    assert gears == pytest.approx(0.4)
-    assert asked.gauge_rr.percent_tolerance and not alone.gauge_rr.percent_tolerance
-
-
 def test_the_result_keeps_its_schema_and_shows_itself():
     fleet = handmade(deformation=0.6, limit_force=85.0, force_tolerance=20.0)
+    assert fleet.gauge_rr.deformation_mm == 0.6 and fleet.gauge_rr.percent_tolerance
     answer = json.loads(fleet.to_json())
     obeys(answer, Fleet)
     assert answer["schema"] == "hdcal.fleet/2" and answer["next_force"]["beyond_tested"]
@@ -230,7 +210,6 @@ def test_the_command_leaves_a_folder(hdcal: Hdcal, tmp_path: Path):
     [
         (("--deformation", 450), ["--deformation"]),
         (("--limit-force", 90), ["--limit-force"]),
-        (("--deformation", "abc"), ["--deformation"]),
         (("--force-tolerance", -1, "--seed", -1), ["--seed", "--force-tolerance"]),
         (("--scheduler", "tcp://x:1"), ["--scheduler"]),
         (("--gears", "none.csv"), ["none.csv"]),
@@ -244,12 +223,3 @@ def test_bad_input_is_refused_before_the_fit(here: Hdcal, options, refused):
     for each, name in zip(lines, refused, strict=True):
         assert each.startswith(f"hdcal: {name}: ")
     assert not Path("line-fleet").exists()
-
-
-@pytest.mark.parametrize("many", [1, 2])
-def test_two_gears_are_no_fleet(many: int):
-    x = np.tile(np.linspace(0.0, 0.5, 6), many)
-    gear = np.repeat(np.arange(many), 6)
-    table = {"gear": gear, "deformation_mm": x, "force_N": 200.0 * x + np.sin(9.0 * x)}
-    with pytest.raises(InputError, match="3 or more"):
-        hdcal.fleet(hdcal.read_case(table, theory="spring"))

@@ -17,7 +17,7 @@ from hdcal.fleets.model.gear_quantity import (
     draw_gears,
     gear_posterior,
 )
-from hdcal.fleets.model.priors import ODD, ODD_RATIO
+from hdcal.fleets.model.quantities import ODD, ODD_RATIO
 from hdcal.inference import laplace
 from hdcal.inference.force_model.likelihood import log_likelihood
 
@@ -54,14 +54,23 @@ GROUPS = {
 GEARS, ROWS = 4, 3
 
 
+def quantity(**given) -> GearQuantity:
+    """Return gears of one lot, rig and operator that scatter, but for what is given."""
+    shape = given["value"].shape
+    none = {"shared": np.zeros(shape[0]), "lot": np.zeros(shape[0], int)}
+    none |= dict.fromkeys(("rig", "operator"), np.zeros(shape, int))
+    none |= {"present": np.ones(shape), "priors": {}, "groups": {}}
+    none |= {"relative": np.asarray(0.0), "by_row": np.asarray(0.0)}
+    return GearQuantity(**none | given)
+
+
 def problem(seed: int = 0, *, relative: float, by_row: float) -> GearQuantity:
     """Return gears with up to three rows each and one noise node."""
     rng = np.random.default_rng(seed)
     shape = GEARS, ROWS
     present = np.ones(shape)
     present[0, 1:] = present[2, 2] = 0.0
-    return GearQuantity(
-        priors={},
+    return quantity(
         value=200.0 + 5.0 * rng.standard_normal(shape),
         error=rng.uniform(0.5, 4.0, shape),
         present=present,
@@ -70,7 +79,6 @@ def problem(seed: int = 0, *, relative: float, by_row: float) -> GearQuantity:
         shared=1e-4 * relative + rng.uniform(0.0, 1e-4 if relative else 2.0, GEARS),
         lot=np.array([0, 1, 1, 0]),
         noise=NoiseNodes(rng.uniform(0.5, 2.0, (GEARS, 1)), jnp.zeros(1)),
-        groups={},
         relative=np.asarray(relative),
         by_row=np.asarray(by_row),
     )
@@ -146,9 +154,9 @@ def test_sizes_of_kilonewtons_have_a_mode(by_row):
         assert np.all(np.isfinite(found.factor))
 
 
-@pytest.mark.parametrize("freedom", [1.0, 4.0, 20.0, 200.0, 2000.0])
-@pytest.mark.parametrize("spread", [0.02, 0.1, 0.3, 0.8])
-@pytest.mark.parametrize("away", [-1.5, 0.0, 1.5])
+@pytest.mark.parametrize("freedom", [1.0, 20.0, 2000.0])
+@pytest.mark.parametrize("spread", [0.02, 0.3, 0.8])
+@pytest.mark.parametrize("away", [-1.5, 1.5])
 def test_the_noise_of_a_gear_is_integrated(freedom, spread, away):
     """Four nodes for each kind against a fine grid."""
     one = GearNoise({}, np.array([freedom]), np.log([0.5]) + away * spread)
@@ -171,19 +179,10 @@ def reml(layout) -> float:
     rows = np.array(layout)
     within = np.var(rows, axis=1, ddof=1).mean()
     gears, count = rows.shape
-    one = GearQuantity(
-        priors={},
+    one = quantity(
         value=rows.mean(axis=1)[:, None],
         error=np.full((gears, 1), 1.0 / count),
-        present=np.ones((gears, 1)),
-        rig=np.zeros((gears, 1), int),
-        operator=np.zeros((gears, 1), int),
-        shared=np.zeros(gears),
-        lot=np.zeros(gears, int),
         noise=NoiseNodes(np.full((gears, 1), np.sqrt(within)), jnp.zeros(1)),
-        groups={},
-        relative=np.asarray(0.0),
-        by_row=np.asarray(0.0),
     )
     places = rows.mean() + rows.std() * np.linspace(-5.0, 5.0, 801)
 

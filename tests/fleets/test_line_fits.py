@@ -1,5 +1,7 @@
 """Sums over mountings give the least-squares fits of all rows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gear_rows import RUNS, SENSE, GearRows, X, bend_shape, ordinary
@@ -75,8 +77,6 @@ def test_neighbours_that_err_alike_widen_the_errors():
     products, lagged = sums.products.copy(), sums.lagged.copy()
     products[:, 3, 3] += drift @ drift
     lagged[:, 3, 3] += drift[1:] @ drift[:-1]
-    from dataclasses import replace
-
     found = line_fits(
         replace(sums, products=products, lagged=lagged), np.zeros(len(sums.gear), int)
     )

@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.linalg import helmert
 
 from hdcal.data.prior import Prior
-from hdcal.fleets.model import priors
+from hdcal.fleets.model import quantities as priors
 from hdcal.fleets.model.population import fit_population
 from hdcal.fleets.model.sampling import Sampling
 

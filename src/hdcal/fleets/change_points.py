@@ -41,13 +41,9 @@ class LevelStep(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Posterior of the ways in which values change.
+    """Probability of each of `WAYS`, and what changes if values change in that way.
 
-    Attributes:
-        ways: probability of each of `WAYS`.
-        steps: the likeliest ones, if there are steps.
-        drift: from the first date to the last, if it is steady.
-        days_sd: sd of the levels of dates, if each has its own.
+    Steps; the drift from the first date to the last; the sd of the levels of dates.
     """
 
     ways: dict[str, float]
@@ -57,13 +53,10 @@ class Changes(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sums over values of variance τ² + v, by the scatter τ of the grid, [scatter, …].
+    """Sums over values of variance w = τ² + v, by the scatter τ, cumulated over dates.
 
-    Attributes:
-        weight: Σ 1/(τ² + v), cumulated over dates from zero; likewise the next two.
-        first: Σ e/(τ² + v).
-        second: Σ e²/(τ² + v) + log(τ² + v).
-        level: variance of levels before the data; [scatter, 1].
+    Σ 1/w, Σ e/w and Σ e²/w + log w, [scatter, date + 1]; and the variance of levels
+    before the data, [scatter, 1].
     """
 
     weight: np.ndarray
@@ -139,10 +132,9 @@ def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
 
 
 def _segments(sums: _Sums) -> tuple[np.ndarray, float]:
-    """Return log prior and evidence of a level by its ends, and log prior of no step.
+    """Return log prior and evidence of levels, [scatter, start, stop].
 
-    Returns:
-        Of each [scatter, start, stop]; and of one level over all dates.
+    With the log prior of one level over all dates.
     """
     scatters, ends = sums.weight.shape
     begin = min(_EXPECTED / (ends - 2), 0.5)
@@ -156,7 +148,7 @@ def _segments(sums: _Sums) -> tuple[np.ndarray, float]:
 
 
 def _partitions(segments: np.ndarray) -> np.ndarray:
-    """Return log prior and evidence of all partitions up to a date, [scatter, stop]."""
+    """Return log prior and evidence of all partitions, [scatter, stop]."""
     scatters, ends, _ = segments.shape
     found = np.zeros((scatters, ends))
     for stop in range(1, ends):
@@ -166,12 +158,7 @@ def _partitions(segments: np.ndarray) -> np.ndarray:
 
 
 def _ends(partitions: np.ndarray, segments: np.ndarray) -> list[int]:
-    """Return the ends of the likeliest levels of one scatter, from the last one back.
-
-    Args:
-        partitions: [stop].
-        segments: [start, stop].
-    """
+    """Return the ends of the likeliest levels, from the last one back."""
     ends = [len(partitions) - 1]
     while ends[0] > 0:
         start = np.arange(ends[0])
@@ -197,12 +184,9 @@ def _line(sums: _Sums, place: np.ndarray):
 
 
 def _steps(sums: _Sums, share: np.ndarray, ends: list[int]) -> Iterator[LevelStep]:
-    """Yield steps, each with place and size given the other steps.
+    """Yield steps between levels with these ends, each given the other steps.
 
-    Args:
-        sums: of the values.
-        share: probability of each scatter.
-        ends: of the levels.
+    `share` is the probability of each scatter.
     """
     for start, stop in zip(ends, ends[2:], strict=False):
         place = np.arange(start + 1, stop)

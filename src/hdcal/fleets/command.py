@@ -55,7 +55,7 @@ def fleet(console: Console, out, force, scheduler, gears, skip_bad, **given):
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
     from hdcal.fleets.next_gear import force_findings
-    from hdcal.fleets.reading.usable import usable
+    from hdcal.fleets.reading.read_fleet import usable
     from hdcal.inference.posterior_file import FILE_NAME
     from hdcal.report.table_files import frame_parquet
 

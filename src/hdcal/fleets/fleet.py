@@ -21,9 +21,8 @@ from hdcal.fleets.model.population import FittedFleet, fit_population
 from hdcal.fleets.model.sampling import Sampling
 from hdcal.fleets.next_gear import force_findings, next_force, next_gear
 from hdcal.fleets.over_time import over_time
-from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.fleets.reading.readings import FleetReadings
-from hdcal.fleets.reading.usable import usable
 from hdcal.fleets.result import Fleet, Group, Population
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.report.item import Interval

@@ -31,10 +31,9 @@ class GaugeRR(Item):
         gears_N: sd between ordinary gears and lots.
         percent_study_variation: sd of the gauge over that of all readings.
         percent_tolerance: six sds of the gauge over the tolerance.
-        distinct_categories: number of gears that one reading can distinguish, rounded
-            down.
-        grade: of the gauge by its share of the tolerance, if there is one, else of the
-            study variation; settled if the whole interval has one grade.
+        distinct_categories: that one reading can distinguish, rounded down.
+        grade: by the share of the tolerance, if there is one, else of the study
+            variation; settled if the whole interval has one grade.
     """
 
     deformation_mm: float = quantity("deformation as read", "mm")

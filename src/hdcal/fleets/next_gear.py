@@ -58,9 +58,8 @@ class Mixture(NamedTuple):
         """
 
         def excess(reach, *parts):
-            half = len(parts) // 2
-            pairs = zip(parts[:half], parts[half:], strict=True)
-            return sum(weight * ndtr(reach / sd) for weight, sd in pairs) - content
+            weight, sd = np.split(np.stack(parts), 2)
+            return np.sum(weight * ndtr(reach / sd), axis=0) - content
 
         ends = np.zeros_like(self.mean), ndtri(content) * self.sd.max(axis=0)
         reach = find_root(excess, ends, args=(*self.weight, *self.sd)).x
@@ -153,7 +152,7 @@ def next_force(
         limit_force: a capacity, its size [N].
         tested: largest deformation that was read [mm].
         seed: of the predictive draws.
-        contents: shares of gears to come, above a half each.
+        contents: shares of gears to come, above a half, of bounds with a confidence.
         confidence: of each bound.
     """
     gears = force_of_gears(draws, deformation)
@@ -200,8 +199,7 @@ def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
     """Return the sd of a new lot, operator or rig about the mean of those measured.
 
-    This mean has an error itself: the sd of one group over the root of their number.
-    The result is zero without such groups.
+    It includes the error of this mean, and is zero without such groups.
     """
     if f"{kind}_sd" not in draws:
         return np.zeros(1)

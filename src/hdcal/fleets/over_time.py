@@ -36,16 +36,12 @@ class Change(Item):
         what: stiffness of gears about the centre of their lot, zero of the mountings of
             a gear on one day about that of their operator, or noise of gears.
         dates: number of dates.
-        probability_changed: that it changes at all, 0.5 before the data.
-        changed: whether that is 0.95 or more.
-        ways: probability of steps, of a steady drift, and of levels that differ from
-            day to day.
-        steps: if there are steps.
+        probability_changed: that it changes at all, 0.5 before the data; from 0.95 on
+            it is `changed`.
         drift: from the first date to the last, if it is steady.
-        days_sd: sd of the days, if they differ.
+        days_sd: sd of the levels of days, if they differ from day to day.
         left_out: flagged gears between others, which are no change.
-        values: gear, day, value about the median, sd of its error and whether it is
-            left out, in the order of the dates.
+        values: gear, day, value about the median, sd of its error, left_out.
     """
 
     what: Literal["stiffness", "zero", "noise"]
@@ -68,18 +64,13 @@ def over_time(readings: FleetReadings, fit: FittedFleet) -> tuple[Change, ...]:
     """Return the changes of each quantity; none if all is of one date or has none."""
     if not readings.case.dates:
         return ()
-    load_unit = readings.case.units.load_unit
-    each = zip(
-        ("stiffness", "zero", "noise"),
-        ("%", load_unit, "%"),
-        _measured(readings, fit),
-        strict=True,
-    )
-    found = (_change(what, unit, values) for what, unit, values in each)
+    units = {"stiffness": "%", "zero": readings.case.units.load_unit, "noise": "%"}
+    each = _measured(readings, fit).items()
+    found = (_change(what, units[what], values) for what, values in each)
     return tuple(change for change in found if change is not None)
 
 
-def _measured(readings: FleetReadings, fit: FittedFleet) -> list[pd.DataFrame]:
+def _measured(readings: FleetReadings, fit: FittedFleet) -> dict[str, pd.DataFrame]:
     """Return the stiffness of gears [%], the zero on days, and the noise of gears [%].
 
     They follow from the lines of each gear alone: the population would shrink them
@@ -113,29 +104,29 @@ def _measured(readings: FleetReadings, fit: FittedFleet) -> list[pd.DataFrame]:
     mean_x, mean_zero = (np.bincount(at, sums.rows * v) / rows for v in (x, zero))
     error = np.sqrt(fits.widening / rows + mean_x**2 / weight[gear])
 
-    def dated(name: str, gear, day, value, sd) -> pd.DataFrame:
-        label, odd = np.array(case.specimen_labels)[gear], fit.flagged(name)[gear]
-        each = {"gear": label, "day": day, "value": value, "sd": sd, "odd": odd}
-        table = pd.DataFrame(each).dropna().sort_values("day", kind="stable")
-        table["value"] -= table["value"].median()
-        odd = np.pad(table.pop("odd").to_numpy(), 1)
-        # Several odd ones in a row may be a change.
-        table["left_out"] = odd[1:-1] & ~odd[:-2] & ~odd[2:]
-        return table.reset_index(drop=True)
-
-    every = np.arange(gears)
     percent = 100.0 / centre
-    return [
-        dated(
-            "stiffness",
-            every,
-            first,
-            percent * (slope - centre),
-            percent * noise / np.sqrt(weight),
+    stiffness = percent * (slope - centre), percent * noise / np.sqrt(weight)
+    zero = mean_zero, noise[gear] * error
+    spread = 100.0 * fits.log_sd, 100.0 / np.sqrt(2.0 * free)
+    labels = np.array(case.specimen_labels)
+    return {
+        "stiffness": _dated(first, labels, fit.flagged("stiffness"), *stiffness),
+        "zero": _dated(
+            on_day.view("M8[D]"), labels[gear], fit.flagged("zero")[gear], *zero
         ),
-        dated("zero", gear, on_day.view("M8[D]"), mean_zero, noise[gear] * error),
-        dated("noise", every, first, 100.0 * fits.log_sd, 100.0 / np.sqrt(2.0 * free)),
-    ]
+        "noise": _dated(first, labels, fit.flagged("noise"), *spread),
+    }
+
+
+def _dated(day, gear, odd, value, sd) -> pd.DataFrame:
+    """Return values that have a date, about their median, in the order of the dates."""
+    each = {"gear": gear, "day": day, "value": value, "sd": sd, "odd": odd}
+    table = pd.DataFrame(each).dropna().sort_values("day", kind="stable")
+    table["value"] -= table["value"].median()
+    odd = np.pad(table.pop("odd").to_numpy(), 1)
+    # Several odd ones in a row may be a change.
+    table["left_out"] = odd[1:-1] & ~odd[:-2] & ~odd[2:]
+    return table.reset_index(drop=True)
 
 
 def _change(what, unit: str, values: pd.DataFrame) -> Change | None:
@@ -145,7 +136,8 @@ def _change(what, unit: str, values: pd.DataFrame) -> Change | None:
     if len(days) < 2:
         return None
     together = -(-len(days) // _MOST_DATES)
-    first, last = days[::together], days[together - 1 :: together]
+    first = days[::together]
+    last = np.append(days[together - 1 : -1 : together], days[-1])
     time = (first - first[0]).astype(float)
     variance = kept["sd"].to_numpy() ** 2
     found = changes(index // together, kept["value"].to_numpy(), variance, time)
@@ -163,8 +155,9 @@ def _change(what, unit: str, values: pd.DataFrame) -> Change | None:
         likeliest=max(ways, key=ways.__getitem__),
         steps=tuple(
             LevelChange(
-                after=str(last[step.before]),
-                before=str(first[step.after]),
+                # The step may lie within a group.
+                after=str(first[step.before]),
+                before=str(last[step.after]),
                 size=_interval(step.size),
             )
             for step in found.steps

@@ -1,14 +1,23 @@
-"""posterior.nc of a fleet: draws of the population, for margins of gears to come."""
+"""posterior.nc of a fleet: draws of the population, and the margin of gears to come."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
 
-from hdcal.fleets.next_gear import stiffness_of_gears
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, Findings, NotUsable
+from hdcal.fleets.next_gear import (
+    CONFIDENCE,
+    CONTENTS,
+    NextForce,
+    force_findings,
+    next_force,
+    stiffness_of_gears,
+)
 from hdcal.inference.posterior_file import (
     FLEET,
     content,
@@ -17,11 +26,12 @@ from hdcal.inference.posterior_file import (
     read_tree,
 )
 from hdcal.inference.posterior_tree import dataset, group_of, joined_draws
+from hdcal.prediction.shares import share_findings
 from hdcal.quantities import BY_LOAD, Quantities
-from hdcal.report.item import Count, Digest, Item, Words
+from hdcal.report.item import INTERVAL, Count, Digest, Item, Words
+from hdcal.report.result import Result
 
 if TYPE_CHECKING:
-    from hdcal.fleets.margin import FleetMargin
     from hdcal.fleets.result import Fleet
 
 _IN_NEWTONS = ("zero", "run_offset_sd", "sigma", "loop", "bend", "operator")
@@ -50,6 +60,17 @@ class FleetFacts(Item):
     seed: Count
     sampling: dict[str, Any]
     versions: dict[str, str]
+
+
+class FleetMargin(NextForce, Result):
+    """The force of gears to come, from the population of a fleet."""
+
+    template = "fleets/margin.md.j2"
+    table = "bounds"
+
+    format: Literal["hdcal.fleet-margin/1"] = "hdcal.fleet-margin/1"
+    interval: float = INTERVAL
+    fleet: FleetFacts
 
 
 @dataclass(frozen=True)
@@ -83,12 +104,50 @@ class FleetPosterior:
         return BY_LOAD[self.facts.load]
 
     def margin(
-        self, deformation: float, limit_force: float | None = None, **shares: float
-    ) -> "FleetMargin":
-        """Return the force of gears to come, as `hdcal.fleets.margin.fleet_margin`."""
-        from hdcal.fleets.margin import fleet_margin
+        self,
+        deformation: float,
+        limit_force: float | None = None,
+        *,
+        content: float | None = None,
+        confidence: float = CONFIDENCE,
+    ) -> FleetMargin:
+        """Return the force that gears to come need at a deformation.
 
-        return fleet_margin(self, deformation, limit_force, **shares)
+        Args:
+            deformation: as read, with the sign of the data [mm].
+            limit_force: a capacity, its size [N].
+            content: share of gears to come that keep each bound; by default there are
+                bounds of 90 and 99 %.
+            confidence: of each bound.
+
+        Raises:
+            InputError: a number is impossible, or in another unit.
+            NotUsable: the fleet failed its checks.
+        """
+        facts, draws, shares = self.facts, self.draws, {"confidence": confidence}
+        shares |= {} if content is None else {"content": content}
+        reach = math.inf if facts.reach_mm is None else facts.reach_mm
+        with Findings() as wrong:
+            given = deformation, limit_force, facts.largest_mm, reach, self.units
+            wrong += force_findings(*given)
+            wrong += share_findings(shares, len(draws["stiffness"]))
+            if content is not None and 0.0 < content <= 0.5:
+                words = f"{content:g} is no more than half of the gears to come"
+                wrong.append(Finding("content", words, "Ask for more than 0.5"))
+        if self.reasons:
+            words = "this fleet failed its checks: "
+            raise NotUsable(words + "; ".join(self.reasons))
+        found = next_force(
+            draws,
+            deformation,
+            limit_force,
+            tested=facts.largest_mm,
+            seed=facts.seed,
+            contents=CONTENTS if content is None else (content,),
+            confidence=confidence,
+        )
+        part = "part" if facts.theory == SPRING else "gear"
+        return FleetMargin(**dict(found), fleet=facts, part=part, units=self.units)
 
     def save(self, path: Path | str) -> None:
         """Write a NetCDF file that ArviZ opens."""

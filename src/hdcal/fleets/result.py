@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, InstanceOf, computed_field
 
-from hdcal.data.gear_file.certificates import GAINS
 from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.fleets.charts import curves_chart, gears_chart, time_chart
@@ -17,10 +16,10 @@ from hdcal.fleets.gear_table import Flagged, GearLeftOut, with_left_out
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
 from hdcal.fleets.model.groups import rigs_are_linked
 from hdcal.fleets.model.population import FittedFleet
-from hdcal.fleets.model.priors import population_priors
+from hdcal.fleets.model.quantities import population_priors
 from hdcal.fleets.next_gear import NextForce, NextGear
 from hdcal.fleets.over_time import Change
-from hdcal.fleets.posterior import FleetPosterior
+from hdcal.fleets.posterior import FleetMargin, FleetPosterior
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import (
@@ -38,8 +37,6 @@ from hdcal.report.result import Result
 if TYPE_CHECKING:
     import xarray as xr
 
-    from hdcal.fleets.margin import FleetMargin
-
 # A stiffness so many prior sds from that of the theory is reported.
 _FAR = 3.0
 # Gears in the table of a terminal, and of a page; gears.csv has all of them.
@@ -47,16 +44,11 @@ _LISTED, _MOST_LISTED = 25, 2000
 
 
 class Population(Item):
-    """Population of the gears; 95 % credible intervals.
+    """Population of the ordinary gears, per mm as read; 95 % credible intervals.
 
-    Attributes:
-        stiffness_N_per_mm: of the centre of ordinary gears, per mm as read.
-        gear_sd_percent: between ordinary gears of a lot.
-        lot_sd_percent: between lots, if lots are distinguished; likewise rigs (of
-            their gains) and operators (of their zeros).
-        reading_sd_N: noise of the readings of ordinary gears.
-        loop_N: force of loading above unloading, of ordinary gears.
-        bend_N: how far the middle of the curve lies below the chord, likewise.
+    Lots, rigs and operators have an sd if they are distinguished. The loop is the force
+    of loading above unloading, the bend how far the middle of the curve lies below its
+    chord.
     """
 
     stiffness_N_per_mm: Interval = quantity("stiffness of the centre", "N/mm")
@@ -77,8 +69,7 @@ class Group(Item):
 
     Attributes:
         members: gears of a lot, or mountings.
-        value: stiffness of a lot, zero of an operator relative to the mean of all of
-            them, or likewise the gain of a rig.
+        value: stiffness of a lot; zero of an operator or gain of a rig, less the mean.
     """
 
     name: Words
@@ -100,8 +91,6 @@ class Fleet(Result):
             which then all numbers but those of gears.csv refer.
         lots: that are distinguished; operators and rigs likewise.
         next_force: of a gear to come, if a deformation was given.
-        over_time: changes with the date, if there are dates.
-        fit: posterior of the population and of all gears.
         readings: of all gears, at the sizes of the gear file.
         gear_table: one row a gear, as in gears.csv.
     """
@@ -156,7 +145,7 @@ class Fleet(Result):
 
     def margin(
         self, deformation: float, limit_force: float | None = None, **shares: float
-    ) -> "FleetMargin":
+    ) -> FleetMargin:
         """Return the force of gears to come, as `FleetPosterior.margin` does."""
         return self.posterior.margin(deformation, limit_force, **shares)
 
@@ -204,16 +193,6 @@ class Fleet(Result):
         return self.gears - sum("stiffness" in one.quantities for one in self.flagged)
 
     @property
-    def mounted_once(self) -> bool:
-        """Whether every gear was mounted once."""
-        return len(self.readings.sums.gear) == self.gears
-
-    @property
-    def certified(self) -> bool:
-        """Whether certificates state the uncertainty of gauges."""
-        return bool({*GAINS} & self.readings.case.gear.priors.keys())
-
-    @property
     def from_theory(self) -> tuple[float, float] | None:
         """Stiffness over that of the theory, and the latter, if they are far apart."""
         expected = population_priors(self.readings.case)[1]["stiffness"]
@@ -221,6 +200,11 @@ class Fleet(Result):
         ratio = self.population.stiffness_N_per_mm.median / middle
         far = self.part == "gear" and abs(np.log(ratio)) > _FAR * log_sd
         return (ratio, middle) if far else None
+
+    @property
+    def linked(self) -> bool:
+        """Whether gears that several rigs measured compare all of the rigs."""
+        return rigs_are_linked(self.readings.sums.gear, self.fit.groups.rig)
 
     @property
     def groups(self) -> dict[str, tuple[int, int, bool]]:
@@ -231,8 +215,3 @@ class Fleet(Result):
             names = getattr(self.fit.groups, kind)
             found[kind] = len({*labels}), len(names), NOT_STATED in names
         return found
-
-    @property
-    def rigs_are_linked(self) -> bool:
-        """Whether gears that several rigs measured compare all of the rigs."""
-        return rigs_are_linked(self.readings.sums.gear, self.fit.groups.rig)

@@ -8,7 +8,6 @@ mode.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +23,7 @@ from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 
+Cells = Float[Array, "g u k"]
 # Nodes about the mode: places in standard deviations, and weights.
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(4)
 _LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
@@ -32,13 +32,10 @@ _NEWTON = 8
 
 
 class GearNoise(Sampled):
-    """Residual noise of every gear.
+    """Degrees of freedom, 0 where nothing is known, and log residual sd of every gear.
 
-    Attributes:
-        priors: of the sites centre [N], spread (of the logarithm), off_share and
-            off_ratio.
-        freedom: degrees of freedom of each gear; 0 where nothing is known.
-        log_sd: logarithm of the residual sd of each gear [N].
+    With priors of the sites centre [N], spread (of the logarithm), off_share and
+    off_ratio.
     """
 
     priors: dict[str, Prior]
@@ -55,15 +52,11 @@ class GearNoise(Sampled):
         numpyro.factor("residuals", log_likelihood(self, values))
 
 
-class NoisePosterior(NamedTuple):
-    """Joint log density of residuals, node and kind of a gear, and log noise sd."""
+def noise_posterior(problem: GearNoise, values: Mapping) -> tuple[Cells, Cells]:
+    """Return the posterior of the noise of gears, given one draw of the population.
 
-    log_joint: Float[Array, "g u k"]
-    log_sd: Float[Array, "g u k"]
-
-
-def noise_posterior(problem: GearNoise, values: Mapping) -> NoisePosterior:
-    """Return the posterior of the noise of gears, given one draw of the population."""
+    Joint log density of residuals, node and kind of a gear, and logarithm of its noise.
+    """
     wide = jnp.stack([jnp.ones(()), jnp.sqrt(1.0 + values["off_ratio"] ** 2)])
     spread = values["spread"] * wide
     own = (problem.log_sd - jnp.log(values["centre"]))[:, None]
@@ -80,7 +73,7 @@ def noise_posterior(problem: GearNoise, values: Mapping) -> NoisePosterior:
         + jnp.log(width)[:, None]
         + jnp.log(jnp.stack([1.0 - share, share]))
     )
-    return NoisePosterior(log_joint, jnp.log(values["centre"]) + spread * place)
+    return log_joint, jnp.log(values["centre"]) + spread * place
 
 
 def _mode(free, own, spread):
@@ -100,7 +93,7 @@ def _mode(free, own, spread):
 
 @log_likelihood.register
 def _(problem: GearNoise, values: Mapping) -> Float[Array, ""]:
-    joint = noise_posterior(problem, values).log_joint
+    joint, _ = noise_posterior(problem, values)
     return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
@@ -109,12 +102,10 @@ def _moments(problem: GearNoise, values: Mapping):
     """Return mean and sd of log σ and the probability of being odd; [gear]."""
 
     def one(draw):
-        found = noise_posterior(problem, draw)
-        flat = found.log_joint.reshape(len(problem.freedom), -1)
-        weight = jax.nn.softmax(flat, axis=1)
-        log_sd = found.log_sd.reshape(flat.shape)
-        first, second = (jnp.sum(weight * log_sd**p, axis=1) for p in (1, 2))
-        return first, second, off_probability(found.log_joint)
+        log_joint, log_sd = noise_posterior(problem, draw)
+        weight = jax.nn.softmax(log_joint, axis=(1, 2))
+        first, second = (jnp.sum(weight * log_sd**p, axis=(1, 2)) for p in (1, 2))
+        return first, second, off_probability(log_joint)
 
     first, second, off = (
         jnp.mean(part, axis=0) for part in jax.lax.map(one, dict(values))

@@ -53,15 +53,10 @@ class GearQuantity(Sampled):
     Attributes:
         priors: of the sites spread, off_share and off_ratio, and lot_ratio, rig_ratio
             and operator_ratio for groups; of _centre, the centre or its logarithm.
-        value: y.
-        error: c.
+        value: y; the error is c.
         present: 1, or 0 where a gear has no more rows.
-        rig: index; 0 where rigs are not distinguished.
-        operator: likewise.
+        rig: index; 0 where rigs are not distinguished; likewise operator and lot.
         shared: s of each gear.
-        lot: of each gear.
-        noise: of the readings of each gear.
-        groups: lots, rigs and operators that are distinguished.
         relative: 1 where θ is a share of a positive centre, else 0.
         by_row: 1 where rows scatter and not gears, else 0.
     """

@@ -1,7 +1,7 @@
 """Lots of gears, rigs and operators of mountings: groups about the mean of all.
 
 How k groups lie about the mean of these k is given by k − 1 contrasts c ~ N(0, sd²).
-They are sampled as what the data alone tell of them, shrunk towards zero by the
+They are sampled about their estimate from the data alone, shrunk towards zero by the
 scatter: c = w e + √(w v) u with w = sd²/(sd² + v), of an estimate e and its variance v.
 Then u is nearly standard normal whatever the scatter, and no funnel is left. The
 density of u is divided out, so that the density of c is exact whatever e and v are.
@@ -69,10 +69,7 @@ def sample_offsets(kind: str, groups: Grouping, sd) -> dict:
 
 
 def group_offsets(values: Mapping, kind: str) -> Float[Array, "k ..."]:
-    """Return the distance of each group from the mean of all; a zero without groups.
-
-    The values are one draw or many by site; the kind is lot, rig or operator.
-    """
+    """Return the distance of each group from the mean of all; a zero without groups."""
     names = [name for name in values if name.removeprefix(f"{kind}_").isdigit()]
     names.sort(key=lambda name: int(name.removeprefix(f"{kind}_")))
     if not names:
@@ -106,13 +103,8 @@ def gains_of_rigs(
     """Return the gains of rigs by least squares, as shares of the stiffness.
 
     A gear that several rigs measured compares these as well as its slopes are known, a
-    gear of a single rig as well as gears are alike.
-
-    Args:
-        value: relative slope of a gear on a rig, shape (r,).
-        variance: of its error, shape (r,).
-        gear: index of the gear, shape (r,).
-        rig: index of the rig, shape (r,).
+    gear of a single rig as well as gears are alike. A value is the relative slope of a
+    gear on a rig, with the variance of its error; all have shape (r,).
     """
     rigs, weight = 1 + int(rig.max()), 1.0 / variance
     apart = value - _medians(value, rig)[rig]

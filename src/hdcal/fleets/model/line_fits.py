@@ -22,7 +22,7 @@ _LEAST_FREE = 4.0
 _ROUNDING = 1e-12
 # Pooled correlation of neighbours that is taken into account: larger than this, and
 # than so many standard errors.
-_LEAST_CORRELATION, _CLEAR, MOST_CORRELATION = 0.2, 4.0, 0.99
+_LEAST_CORRELATION, _CLEAR, _MOST_CORRELATION = 0.2, 4.0, 0.99
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class LineFits:
     @property
     def widening(self) -> float:
         """Factor of variances due to the correlation of neighbours."""
-        return widening(self.correlation)
+        return (1.0 + self.correlation) / (1.0 - self.correlation)
 
 
 def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFits:
@@ -64,8 +64,7 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
     Args:
         sums: of every mounting.
         rig: index of the rig of each mounting, shape (m,).
-        step: resolution of the force display [N]: readings that it shows on an exact
-            line scatter nevertheless, by rounding.
+        step: of the force display [N]: readings on an exact line scatter by rounding.
     """
     rigs, gears = 1 + int(rig.max()), 1 + int(sums.gear.max())
     pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)
@@ -87,7 +86,8 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
     variance = np.where(known, square, 1.0) / np.where(known, freedom, 1.0)
     follow = line.squares(lagged) / variance[gear]
     correlation = _correlation(follow[known[gear]], freedom[known])
-    wider, moved, swing = widening(correlation), line.known[:, 0], _swing(sums)
+    wider = (1.0 + correlation) / (1.0 - correlation)
+    moved, swing = line.known[:, 0], _swing(sums)
     return LineFits(
         gear=gear[moved],
         rig=of_rig[moved],
@@ -104,19 +104,14 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
     )
 
 
-def widening(correlation):
-    """Return the factor of variances of means of noise with correlated neighbours."""
-    return (1.0 + correlation) / (1.0 - correlation)
-
-
 class TermFits(NamedTuple):
-    """Coefficients of terms, each beside those before it, of p curves.
+    """Coefficients of three terms of p curves, each beside those before it.
 
     Attributes:
         size: coefficient; NaN where it is not known; shape (p, 3).
-        error: its variance over σ²; shape (p, 3).
-        known: which terms the readings distinguish; shape (p, 3).
-        residual: the residual as a combination of v; shape (p, 4).
+        error: its variance over σ².
+        known: which terms the readings distinguish.
+        residual: the residual as a combination of v, shape (p, 4).
     """
 
     size: np.ndarray
@@ -134,11 +129,10 @@ def fit_terms(
 ) -> TermFits:
     """Fit terms in an order, each to what those before it leave.
 
-    The slope comes first: it is that of the straight line alone.
-
     Args:
         products: of v, shape (p, 4, 4).
-        order: of x, sense and x|x|, by their places in v.
+        order: of x, sense and x|x|, by their places in v. The slope comes first: it is
+            that of the straight line alone.
         free: degrees of freedom before the fit, shape (p,).
     """
     count = len(products)
@@ -177,12 +171,10 @@ def _summed(parts: np.ndarray, index: np.ndarray, count: int) -> np.ndarray:
 def _correlation(follow: np.ndarray, freedom: np.ndarray) -> float:
     """Return the pooled correlation of neighbours, if it is clear.
 
-    Args:
-        follow: sum of the products of neighbouring residuals over their variance.
-        freedom: degrees of freedom of each gear.
+    `follow` sums the products of neighbouring residuals over their variance.
     """
     whole = max(float(freedom.sum()), 1.0)
-    found = min(float(follow.sum()) / whole, MOST_CORRELATION)
+    found = min(float(follow.sum()) / whole, _MOST_CORRELATION)
     return found if found > max(_LEAST_CORRELATION, _CLEAR / np.sqrt(whole)) else 0.0
 
 

@@ -1,46 +1,33 @@
 """The posterior of a fleet: the population of each quantity, and every gear in it.
 
-The noise comes first: what the residuals of a gear tell of its noise is integrated over
-in the other quantities, which tell next to nothing of the noise.
+The noise comes first: in the other quantities, which hold next to nothing about it, it
+is integrated over.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from hdcal.fleets.model.gear_noise import GearNoise, gear_noise
+from hdcal.fleets.model.gear_noise import gear_noise
 from hdcal.fleets.model.gear_quantity import MOST_FALSE, GearQuantity, draw_gears
 from hdcal.fleets.model.groups import group_offsets
 from hdcal.fleets.model.line_fits import LineFits, line_fits
-from hdcal.fleets.model.priors import population_priors
-from hdcal.fleets.model.quantities import FleetGroups, Problems, noise_problem
-from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.model.quantities import (
+    FleetGroups,
+    Problems,
+    noise_problem,
+    population_priors,
+)
+from hdcal.fleets.model.sampling import Populations, Sampling
 from hdcal.fleets.reading.mounting_sums import MountingSums
 from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import Check
 from hdcal.report.item import TAILS
 
-# Names of sites in the draws; other sites get the name of the quantity before theirs.
-_SITES = {
-    "stiffness": {
-        "centre": "stiffness",
-        "spread": "specimen_sd",
-        "off_share": "off_share",
-        "off_ratio": "off_ratio",
-    },
-    "zero": {"centre": "zero", "spread": "run_offset_sd"},
-    "noise": {"centre": "sigma"},
-    "loop": {"centre": "loop"},
-    "bend": {"centre": "bend"},
-}
 _SHAPES = ("loop", "bend")
-_GROUPS = ("lot_", "rig_", "operator_")
-# Gears that the population is sampled from, at most; of more a random choice of so
-# many, which tell its scatter to 1 %.
-MOST_SAMPLED = 5_000
 # Fewest gears that tell how much their loops or bends differ.
 _FEWEST = 3
 # Draws of the population over which the noise of gears and their probability of being
@@ -62,11 +49,7 @@ class FittedFleet:
             bend_N, and off_stiffness, … off_bend, the probability of being odd.
         stiffness: draws of each gear at the sizes of the gear file, shape (t, g)
             [N/mm as read].
-        groups: lots, rigs and operators.
-        fits: curves of each gear alone.
         unit: stiffness at K = 1 [N/mm as read].
-        checks: of the samplers.
-        settings: of the run.
     """
 
     draws: Mapping[str, np.ndarray]
@@ -88,53 +71,8 @@ class FittedFleet:
         return 1.0 - self.gears[f"off_{quantity}"].to_numpy() <= MOST_FALSE
 
 
-class _Populations:
-    """Draws and checks of the populations that were sampled so far.
-
-    Args:
-        sampling: settings of the samplers.
-        gears: number of gears.
-        names: quantities in the order in which they are sampled.
-    """
-
-    def __init__(self, sampling: Sampling, gears: int, names: Sequence[str]):
-        rng = np.random.default_rng(sampling.seed)
-        self._sampling, self._names = sampling, names
-        self._chosen = np.sort(rng.permutation(gears)[:MOST_SAMPLED])
-        self.draws: dict[str, np.ndarray] = {}
-        self.checks: list[Check] = []
-
-    def sample(
-        self,
-        name: str,
-        problem: GearNoise | GearQuantity,
-        start: Mapping[str, float],
-        many: int = _AVERAGED,
-    ) -> dict[str, np.ndarray]:
-        """Sample the population of a quantity, and return so many of its draws."""
-        sampling, whole = self._sampling, self._sampling.progress
-        before, every = self._names.index(name), len(self._names)
-        if whole is not None:
-            sampling = replace(
-                sampling,
-                progress=lambda n, total: whole(before * total + n, every * total),
-            )
-        values, checks = sampling.run(name, problem.some(self._chosen), start)
-        self.checks.extend(checks)
-        for site, value in values.items():
-            plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
-            self.draws[_SITES[name].get(site, plain)] = value
-        step = -(-len(next(iter(values.values()))) // many)
-        return {site: value[::step] for site, value in values.items()}
-
-
 def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
-    """Sample the population, and every gear given its draws.
-
-    Args:
-        readings: at the sizes of the gear file.
-        sampling: settings of the samplers.
-    """
+    """Sample the population at the sizes of the gear file, and every gear given it."""
     sums, seed = readings.sums, sampling.seed
     groups = FleetGroups.of(readings.case, sums.run)
     fits = line_fits(sums, groups.rig, readings.step)
@@ -143,10 +81,11 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
     known = {name: fits.gear[np.isfinite(getattr(fits, name))] for name in _SHAPES}
     shapes = [n for n, of in known.items() if len(np.unique(of)) >= _FEWEST]
     names = "noise", "stiffness", "zero", *shapes
-    populations = _Populations(sampling, gears, names)
+    populations = Populations(sampling, gears, names)
 
     noisy, start = noise_problem(fits, priors)
-    noise, noise_sd, odd = gear_noise(noisy, populations.sample("noise", noisy, start))
+    values = populations.sample("noise", noisy, start, _AVERAGED)
+    noise, noise_sd, odd = gear_noise(noisy, values)
     table = {"noise_sd_N": noise_sd, "off_noise": odd}
 
     slots = max(np.bincount(fits.gear).max(), np.bincount(sums.gear).max())
@@ -160,7 +99,7 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
     zeros, error, shared = _zeros(sums, groups.rig)
     zeros, wider = readings.side * zeros, fits.widening
     problem, start = problems.zero(sums, zeros, wider * error, wider * shared)
-    values = populations.sample("zero", problem, start)
+    values = populations.sample("zero", problem, start, _AVERAGED)
     table["zero_N"] = np.bincount(sums.gear, zeros) / np.bincount(sums.gear)
     table["off_zero"] = _odd(problem, values, seed)
 
@@ -169,12 +108,10 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         table |= {f"{name}_N": np.full(gears, np.nan), f"off_{name}": np.zeros(gears)}
         if name in shapes:
             problem, start = problems.shape(fits, name, largest_force)
-            values = populations.sample(name, problem, start)
-            each: Any = pd.Series(getattr(fits, name))
-            sizes = each.groupby(fits.gear).mean()
+            values = populations.sample(name, problem, start, _AVERAGED)
+            sizes: Any = pd.Series(getattr(fits, name)).groupby(fits.gear).mean()
             table[f"{name}_N"] = sizes.reindex(range(gears)).to_numpy()
             table[f"off_{name}"] = _odd(problem, values, seed)
-    settings = {n: getattr(sampling, n) for n in ("seed", "chains", "warmup", "draws")}
     return FittedFleet(
         draws=populations.draws,
         gears=pd.DataFrame(table),
@@ -183,7 +120,7 @@ def fit_population(readings: FleetReadings, sampling: Sampling) -> FittedFleet:
         fits=fits,
         unit=unit,
         checks=tuple(populations.checks),
-        settings=settings,
+        settings=sampling.settings,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
+from hdcal.evidence.base_model import moments, stiffness_prior
 from hdcal.fleets.model.gear_noise import GearNoise
 from hdcal.fleets.model.gear_quantity import GearQuantity, NoiseNodes
 from hdcal.fleets.model.groups import (
@@ -18,17 +19,21 @@ from hdcal.fleets.model.groups import (
     robust_sd,
 )
 from hdcal.fleets.model.line_fits import LineFits
-from hdcal.fleets.model.priors import (
-    GROUP_RATIO,
-    NOISE_SPREAD,
-    ODD,
-    ODD_RATIO,
-    ODD_STIFFNESS,
-    shape_priors,
-)
 from hdcal.fleets.reading.mounting_sums import MountingSums
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.force_model.priors import problem_priors
 
+# By judgement one gear in ten is odd in its stiffness, one in a hundred in another
+# quantity, some six times as far out as ordinary gears. The noise of gears on one rig
+# differs by 1 to 100 %. Lots scatter about as gears of one lot do, seldom a tenth of it
+# or seven times as far; zeros of operators as those of mountings, and gains of rigs as
+# gears.
+ODD_STIFFNESS, ODD = Prior("beta", (1.0, 9.0)), Prior("beta", (1.0, 99.0))
+ODD_RATIO = Prior("lognormal", (6.0, 0.7))
+NOISE_SPREAD = Prior("lognormal", (0.1, 1.2))
+GROUP_RATIO = Prior("lognormal", (0.7, 1.2))
+# Shares of the largest force: a loop or a bend of all gears, and how much gears differ,
+# by a factor of some four either way.
+_SHAPE, _SHAPE_SPREAD, _SHAPE_LOG_SD = 0.05, 0.005, 1.4
 # Least relative scatter that is noticeable.
 _LEAST = 1e-4
 # Sds from the centre at which few ordinary gears are.
@@ -68,6 +73,31 @@ class FleetGroups:
         return cls(*each)
 
 
+def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
+    """Return the stiffness at K = 1 [N/mm as read], and the priors of a population."""
+    own = problem_priors(case, (), {}, case.gear.theory)
+    half = 0.5 if case.gear.reading == "diametral" else 1.0
+    log_mean, log_sd, nominal = stiffness_prior(case, own)
+    centre = half * float(np.exp(log_mean))
+    zero, gauge_sd = moments(own, "force_offset")
+    contact, contact_sd = moments(own, "deformation_offset")
+    zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
+    return half * nominal, {
+        "stiffness": Prior("lognormal", (centre, log_sd)),
+        "zero": Prior("normal", (zero - centre * contact, zero_sd)),
+        **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
+    }
+
+
+def shape_priors(largest_force: float) -> tuple[Prior, Prior]:
+    """Return the priors of the loop or bend of all gears, and of its scatter [N]."""
+    scatter = _SHAPE_SPREAD * largest_force
+    return (
+        Prior("normal", (0.0, _SHAPE * largest_force)),
+        Prior("lognormal", (scatter, _SHAPE_LOG_SD)),
+    )
+
+
 def noise_problem(
     fits: LineFits, priors: Mapping[str, Prior]
 ) -> tuple[GearNoise, dict[str, float]]:
@@ -77,7 +107,7 @@ def noise_problem(
     problem = GearNoise(own | odd, fits.freedom, fits.log_sd)
     known = fits.log_sd[fits.freedom > 0.0]
     start = {"centre": float(np.exp(np.median(known)))} if len(known) else {}
-    return problem, _sampled(start, problem)
+    return problem, start
 
 
 @dataclass(frozen=True)
@@ -85,10 +115,7 @@ class Problems:
     """Problems of the quantities of one fleet, all of one structure.
 
     Attributes:
-        groups: of gears and mountings.
-        noise: of each gear.
-        noise_sd: its median, shape (g,) [N].
-        priors: of the population.
+        noise: of each gear, with its median `noise_sd`, shape (g,) [N].
         slots: most rows of a gear.
     """
 
@@ -127,7 +154,7 @@ class Problems:
         problem = self._problem(own, fits.gear, columns, found, relative=1.0)
         start = _start(of_gear, 1.0)
         start["_centre"] = float(np.log(middle * (1.0 + start["_centre"])))
-        return problem, _sampled(start, problem)
+        return problem, start
 
     def zero(
         self,
@@ -136,13 +163,10 @@ class Problems:
         error: np.ndarray,
         shared: np.ndarray,
     ) -> Quantity:
-        """Return the population of the zeros, which scatter between mountings.
+        """Return the population of the zeros (m,), which scatter between mountings [N].
 
-        Args:
-            sums: of each mounting.
-            zeros: beside the line of the gear, shape (m,) [N].
-            error: variance of their errors over σ², shape (m,).
-            shared: variance of an error that all zeros of a gear share, shape (g,).
+        With the variance of their errors over σ², (m,), and of the error that all zeros
+        of a gear share, (g,).
         """
         operator, rest = self.groups.operator, zeros
         found: dict[str, Grouping] = {}
@@ -157,7 +181,7 @@ class Problems:
         columns = {"value": zeros, "error": error, "operator": operator}
         how = {"shared": shared, "by_row": 1.0}
         problem = self._problem(own, sums.gear, columns, found, **how)
-        return problem, _sampled(_start(rest, self._usual_noise), problem)
+        return problem, _start(rest, self._usual_noise)
 
     def shape(self, fits: LineFits, name: str, largest_force: float) -> Quantity:
         """Return the population of the loop or the bend, by its name."""
@@ -167,7 +191,7 @@ class Problems:
         own = {"_centre": centre, "spread": spread, "off_share": ODD}
         columns = {"value": value[known], "error": error[known]}
         problem = self._problem(own, fits.gear[known], columns, {})
-        return problem, _sampled(_start(value[known], self._usual_noise), problem)
+        return problem, _start(value[known], self._usual_noise)
 
     @property
     def _usual_noise(self) -> float:
@@ -222,9 +246,7 @@ class Problems:
 def _start(values: np.ndarray, unit: float) -> dict[str, float]:
     """Return centre, scatter and share of odd gears, roughly.
 
-    Args:
-        values: of gears or mountings.
-        unit: a size in which a scatter is noticeable.
+    A scatter is noticeable in a unit.
     """
     middle = float(np.median(values))
     sd = robust_sd(values - middle)
@@ -232,9 +254,3 @@ def _start(values: np.ndarray, unit: float) -> dict[str, float]:
     start = {"_centre": middle, "off_share": float((1.0 + far) / (10.0 + len(values)))}
     # A scatter of zero, as of few or of rounded readings, is no place to start from.
     return start | ({"spread": sd} if sd > _LEAST * unit else {})
-
-
-def _sampled(start: dict[str, float], problem: Sampled) -> dict[str, float]:
-    """Return the start of the sites that are sampled."""
-    fixed = {n for n, prior in problem.priors.items() if prior.family == "fixed"}
-    return {name: value for name, value in start.items() if name not in fixed}

@@ -53,11 +53,10 @@ def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]
             words = "its sizes have no meaning, as no gear file states sizes"
             findings.refuse(words, "Name one, as `gear` FILE.toml")
         table, _ = read_source(source, findings)
-        places = _size_columns(table, findings)
-        labels = _labels(table, case, findings)
-    faults = FileFindings(name)
+        places, specimen = _columns(table, case, findings)
+    labels, faults = table.grid.texts(specimen), FileFindings(name)
     sizes = {
-        header.removesuffix("_mm"): _column(table, header, place, faults)
+        header.removesuffix("_mm"): _numbers(table, header, place, faults)
         for header, place in places.items()
     }
     faults.add_rows(_at_odds(table, sizes, case.gear))
@@ -69,30 +68,15 @@ def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]
     rows = [row_of.get(gear, -1) for gear in case.specimen_labels]
     each = {size: np.append(column, np.nan)[rows] for size, column in sizes.items()}
     missing = Finding(name, "has no row in the table of sizes", "Add its sizes")
-    unsized = {
-        gear: bad.get(gear, missing)
-        for gear in case.specimen_labels
-        if gear not in row_of
-    }
-    return np.broadcast_to(_ratio(each, case.gear), len(rows)), unsized
+    unsized = [gear for gear in case.specimen_labels if gear not in row_of]
+    faulty = {gear: bad.get(gear, missing) for gear in unsized}
+    return np.broadcast_to(_ratio(each, case.gear), len(rows)), faulty
 
 
-def _labels(table: ReadTable, case: Case, findings: FileFindings) -> list[str]:
-    """Return the gear of each row."""
-    known = case.columns.get("specimen")
-    places = [
-        place
-        for place, header in enumerate(table.headers)
-        if header == known or parse_header(header).quantity == "specimen"
-    ]
-    if len(places) != 1:
-        words = "no column, or more than one, names the gear of a row"
-        findings.refuse(words, f"Name one column {known or 'specimen'}")
-    return table.grid.texts(places[0])
-
-
-def _size_columns(table: ReadTable, findings: FileFindings) -> dict[str, int]:
-    """Return the places of the columns of sizes."""
+def _columns(
+    table: ReadTable, case: Case, findings: FileFindings
+) -> tuple[dict[str, int], int]:
+    """Return the places of the columns of sizes, and of the one that names the gear."""
     for header in table.headers:
         if header not in SIZES and any(word in header.lower() for word in _SIZE_WORDS):
             words = "a size is not read under this name"
@@ -101,10 +85,19 @@ def _size_columns(table: ReadTable, findings: FileFindings) -> dict[str, int]:
     if not places or len({*table.headers}) < len(table.headers):
         words = "it has no column of sizes, or two of one name"
         findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
-    return places
+    known = case.columns.get("specimen")
+    named = [
+        place
+        for place, header in enumerate(table.headers)
+        if header == known or parse_header(header).quantity == "specimen"
+    ]
+    if len(named) != 1:
+        words = "no column, or more than one, names the gear of a row"
+        findings.refuse(words, f"Name one column {known or 'specimen'}")
+    return places, named[0]
 
 
-def _column(
+def _numbers(
     table: ReadTable, header: str, place: int, findings: FileFindings
 ) -> np.ndarray:
     """Return a size of each row [mm], NaN where it is wrong."""
@@ -122,7 +115,7 @@ def _column(
 def _at_odds(
     table: ReadTable, sizes: Mapping[str, np.ndarray], gear: Gear
 ) -> Iterator[tuple[int, str, str]]:
-    """Yield rows with sizes that are at odds with each other or the gear file's."""
+    """Yield rows with sizes that contradict each other or the gear file's."""
     names = [name.removesuffix("_mm") for name in SIZES]
     others = {name: float(getattr(gear.geometry, name)) for name in names}
     # Without a height of its own the load acts at the end.

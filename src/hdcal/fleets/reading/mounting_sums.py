@@ -1,23 +1,24 @@
 """Sums over the readings of each mounting: all that the model of a fleet needs."""
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 
 
-class RowSums(NamedTuple):
-    """Sums over sets of rows, of the vector v of every row.
+@dataclass(frozen=True)
+class RowSums:
+    """Sums over p sets of rows, of the vector v = (x, sense, x|x|, y) of every row.
+
+    x is the deformation as read times the modulus that is left [mm], the sense that of
+    the movement (1 loading, −1 unloading), y the force [N].
 
     Attributes:
         rows: number of rows, shape (p,).
         mean: of v, shape (p, 4).
         products: sum of (v − mean)(v − mean)ᵀ, shape (p, 4, 4).
-        lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over rows that follow another one
-            of the set, shape (p, 4, 4).
-        first: v of the first row, shape (p, 4).
-        last: v of the last row, shape (p, 4).
-        low: smallest deformation as read, shape (p,) [mm].
+        lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over successive rows.
+        low: smallest deformation, shape (p,) [mm].
         high: largest one.
     """
 
@@ -25,13 +26,11 @@ class RowSums(NamedTuple):
     mean: np.ndarray
     products: np.ndarray
     lagged: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
     low: np.ndarray
     high: np.ndarray
 
     @classmethod
-    def of(cls, index: np.ndarray, v: np.ndarray, deformation: np.ndarray) -> Self:
+    def of(cls, index: np.ndarray, v: np.ndarray, deformation: np.ndarray) -> "RowSums":
         """Sum rows in the order in which they were taken.
 
         Args:
@@ -48,111 +47,49 @@ class RowSums(NamedTuple):
         before = np.zeros_like(about)
         before[:, 1:] = about[:, :-1]
         before[:, start] = 0.0
-        return cls(
-            rows.astype(float),
-            mean.T,
-            _product_sums(about, about, start),
-            _product_sums(about, before, start),
-            v[:, start].T,
-            v[:, start + rows - 1].T,
-            np.minimum.reduceat(read, start),
-            np.maximum.reduceat(read, start),
-        )
+        products, lagged = np.empty((2, len(rows), len(v), len(v)))
+        for i, row in enumerate(about):
+            for j in range(len(v)):
+                products[:, i, j] = np.add.reduceat(row * about[j], start)
+                lagged[:, i, j] = np.add.reduceat(row * before[j], start)
+        low, high = np.minimum.reduceat(read, start), np.maximum.reduceat(read, start)
+        return RowSums(rows.astype(float), mean.T, products, lagged, low, high)
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Largest deformation without its sign, shape (p,) [mm]."""
+        return np.maximum(np.abs(self.low), np.abs(self.high))
+
+    def where(self, kept: np.ndarray) -> Self:
+        """Return some sets, by a mask or by indices."""
+        return type(self)(*(getattr(self, each.name)[kept] for each in fields(self)))
 
     def joined(self, index: np.ndarray) -> "RowSums":
         """Return the sums of wholes whose parts these are, in the order of the rows.
+
+        Pairs of successive rows of different parts are left out of `lagged`.
 
         Args:
             index: of the whole of each part, 0, 1, … without a gap, shape (p,).
         """
         order = np.argsort(index, kind="stable")
-        parts = RowSums(*(column[order] for column in self))
-        whole = index[order]
+        parts, whole = self.where(order), index[order]
         start = np.searchsorted(whole, np.arange(1 + whole.max()))
-        end = np.append(start[1:], len(whole)) - 1
-        rows = np.add.reduceat(parts.rows, start)
-        mean = np.add.reduceat(parts.rows[:, None] * parts.mean, start) / rows[:, None]
-        middle = mean[whole]
-        shift = parts.mean - middle
-        products = parts.products + parts.rows[:, None, None] * _outer(shift, shift)
-        # Without the first row of a part its rows have another mean; likewise the last.
-        first, last = parts.first - middle, parts.last - middle
-        lagged = (
-            parts.lagged
-            + (parts.rows[:, None, None] + 1.0) * _outer(shift, shift)
-            - _outer(first, shift)
-            - _outer(shift, last)
-        )
-        # The first row of a part follows the last one of the part before.
-        follows = np.ones(len(whole), bool)
-        follows[start] = False
-        lagged[follows] += _outer(first[follows], last[np.flatnonzero(follows) - 1])
+        rows, each = np.add.reduceat(parts.rows, start), parts.rows[:, None]
+        mean = np.add.reduceat(each * parts.mean, start) / rows[:, None]
+        shift = parts.mean - mean[whole]
+        between = each[..., None] * _outer(shift, shift)
         return RowSums(
             rows,
             mean,
-            np.add.reduceat(products, start),
-            np.add.reduceat(lagged, start),
-            parts.first[start],
-            parts.last[end],
+            np.add.reduceat(parts.products + between, start),
+            np.add.reduceat(parts.lagged + between, start),
             np.minimum.reduceat(parts.low, start),
             np.maximum.reduceat(parts.high, start),
         )
 
-
-def _product_sums(one: np.ndarray, other: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return the sums of one[i] other[j] from each start on, shape (p, 4, 4)."""
-    sums = np.empty((len(start), len(one), len(other)))
-    for i, left in enumerate(one):
-        for j, right in enumerate(other):
-            sums[:, i, j] = np.add.reduceat(left * right, start)
-    return sums
-
-
-def _outer(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return one[:, :, None] * other[:, None, :]
-
-
-def reading_vectors(x: np.ndarray, sense: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return v = (x, sense, x|x|, y) of each row, shape (4, n).
-
-    Args:
-        x: deformation as read times the modulus that is left, shape (n,) [mm].
-        sense: of the last movement, shape (n,).
-        force: shape (n,) [N].
-    """
-    return np.stack([x, sense, x * np.abs(x), force])
-
-
-@dataclass(frozen=True)
-class MountingSums:
-    """Sums over the readings of every mounting, in the order of the gears.
-
-    Attributes:
-        gear: index of the gear, shape (m,).
-        run: index of the run, shape (m,).
-        rows: number of readings, shape (m,).
-        mean: of v = (x, sense, x|x|, y), shape (m, 4): the deformation x as read times
-            the modulus over that at the reference temperature [mm], the sense of the
-            movement (1 loading, −1 unloading), and the force y [N].
-        products: sum of (v − mean)(v − mean)ᵀ, shape (m, 4, 4).
-        lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over successive readings.
-        reach: largest deformation, without its sign, shape (m,) [mm].
-    """
-
-    gear: np.ndarray
-    run: np.ndarray
-    rows: np.ndarray
-    mean: np.ndarray
-    products: np.ndarray
-    lagged: np.ndarray
-    reach: np.ndarray
-
-    def where(self, kept: np.ndarray) -> "MountingSums":
-        """Return the mountings that are true in a mask, shape (m,)."""
-        return MountingSums(*(getattr(self, each.name)[kept] for each in fields(self)))
-
-    def stretched(self, factor: np.ndarray) -> "MountingSums":
-        """Return sums as if x were longer by a factor of each mounting, shape (m,)."""
+    def stretched(self, factor: np.ndarray) -> Self:
+        """Return sums as if x were longer by a factor of each set, shape (p,)."""
         one = np.ones(len(factor))
         scale = np.stack([factor, one, factor * np.abs(factor), one], axis=1)
         return replace(
@@ -160,5 +97,23 @@ class MountingSums:
             mean=scale * self.mean,
             products=_outer(scale, scale) * self.products,
             lagged=_outer(scale, scale) * self.lagged,
-            reach=np.abs(factor) * self.reach,
+            low=factor * self.low,
+            high=factor * self.high,
         )
+
+
+@dataclass(frozen=True)
+class MountingSums(RowSums):
+    """Sums of every mounting, with the index of its gear, ascending, and of its run."""
+
+    gear: np.ndarray
+    run: np.ndarray
+
+
+def _outer(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return one[:, :, None] * other[:, None, :]
+
+
+def reading_vectors(x: np.ndarray, sense: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return v of each row, shape (4, n)."""
+    return np.stack([x, sense, x * np.abs(x), force])

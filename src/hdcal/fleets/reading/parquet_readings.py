@@ -1,7 +1,7 @@
 """Parquet files of many gears, of whose rows only sums are kept."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -36,15 +36,10 @@ _SAMPLE = 10
 
 @dataclass
 class BatchSums:
-    """Sums of the rows that were read so far.
+    """Sums of the rows that were read so far, by the labels of rows in a batch.
 
-    Attributes:
-        source: of the rows.
-        labels: of each set of rows with the same labels in a batch.
-        sums: of these sets.
-        shown: the first rows.
-        observed: observations of the screening, each with its file.
-        left_out: gears with a faulty cell, or about whose record screening asks.
+    With the first rows, the observations of the screening and their files, and the
+    gears with a faulty cell or about whose record screening asks.
     """
 
     source: Parquet
@@ -68,8 +63,7 @@ class BatchSums:
         wanted = asked_range(self.source.range)
         labels, index, v, sums = self._summed(read)
         odd = _irregular(read, index, v, sums) | (wanted is not None)
-        regular = RowSums(*(each[~odd] for each in sums))
-        self._keep(read.where(~odd[index]), labels[~odd], regular)
+        self._keep(read.where(~odd[index]), labels[~odd], sums.where(~odd))
         if not odd.any():
             return
         found, screening = screened(read.where(odd[index]), wanted, True, whole=False)
@@ -104,10 +98,8 @@ class BatchSums:
         """Keep the first rows of gears that are not left out."""
         shown, room = [], _SHOWN
         for part in [*self.shown, *parts]:
-            if room == 0:
-                break
             left_out = part.frame["specimen"].isin([*self.left_out])
-            frame = part.frame[~left_out][:room]
+            frame = part.frame[~left_out][:room] if room else part.frame[:0]
             room -= len(frame)
             shown += [replace(part, frame=frame)] if len(frame) else []
         self.shown = shown
@@ -129,15 +121,15 @@ class BatchSums:
         table: Any = pd.concat([*self.labels, pd.DataFrame(columns=self.keys)])
         table = table.reset_index(drop=True)
         table = table[~table["specimen"].isin([*self.left_out])]
-        self._show([])
         if table.empty or not self.shown:
             raise InputError(self.left_out.values())
         # In the order of the gears, which is that of their first rows.
         table = table.sort_values(["file", "row"])
         table = table.assign(gear=pd.factorize(table["specimen"])[0])
         table = table.sort_values("gear", kind="stable")
-        columns = zip(*self.sums, strict=True)
-        sums = RowSums(*(np.concatenate(each)[table.index] for each in columns))
+        names = [each.name for each in fields(RowSums)]
+        columns = ([getattr(one, name) for one in self.sums] for name in names)
+        sums = RowSums(*map(np.concatenate, columns)).where(table.index)
         gear, gears = table["gear"].to_numpy(), table["specimen"].unique()
         if "run" not in table:
             stated = {name: table[name].to_numpy() for name in self.keys[2:]}
@@ -158,11 +150,7 @@ class BatchSums:
         return readings_of(case, gear[first], run[first], sums.joined(run))
 
     def _case(self, table: pd.DataFrame):
-        """Return the first rows as a case.
-
-        Args:
-            table: labels of all rows, with the index of their gear and run.
-        """
+        """Return the first rows as a case; the table has gear and run of all labels."""
         source = self.source
         found = joined(self.shown, source.gear.reference_temperature, {})
         found = replace(found, sha256=source.sha256, named=source.named)
@@ -170,22 +158,15 @@ class BatchSums:
         text = dict.fromkeys(self.keys, str)
         whole = table.astype(text).drop_duplicates(self.keys)
         index = found.frame[self.keys].astype(text).merge(whole, "left", self.keys)
-        records = replace(
-            case.records,
-            run=index["index_of_run"].to_numpy(),
-            specimen=index["gear"].to_numpy(),
-        )
-        return replace(case, records=records)
+        run, gear = index["index_of_run"].to_numpy(), index["gear"].to_numpy()
+        return replace(case, records=replace(case.records, run=run, specimen=gear))
 
 
 def senses(x: np.ndarray, index: np.ndarray) -> np.ndarray:
     """Return the sense of the last movement of each row, as `derive_motion` does.
 
     Records without noise in the deformation, which are most, are looked at all at once.
-
-    Args:
-        x: deformation as read, shape (n,).
-        index: of the record of each row, shape (n,).
+    The index is that of the record of each row, shape (n,).
     """
     order = np.argsort(index, kind="stable")
     read, record = x[order], index[order]
@@ -218,18 +199,13 @@ def _irregular(
         if not found.observations:
             # The noise of all gears is correlated.
             odd = irregular(sums, v, index, relative=True)
-    return odd | _scatters(x, index)
-
-
-def _scatters(x: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return records whose deformation may scatter by itself, shape (p,)."""
+    # The deformation of a record may scatter by itself.
     order = np.argsort(index, kind="stable")
-    read, record = x[order], index[order]
-    rows = np.bincount(record)
-    bend = np.where(record[2:] == record[:-2], np.diff(read, 2), 0.0)
-    scatter = np.bincount(record[2:], bend**2, len(rows)) / (6.0 * rows)
-    off = read - (np.bincount(record, read) / rows)[record]
-    return scatter > _SCATTER**2 * np.bincount(record, off**2) / rows
+    x, record = x[order], index[order]
+    bend = np.where(record[2:] == record[:-2], np.diff(x, 2), 0.0)
+    scatter = np.bincount(record[2:], bend**2, len(odd)) / 6.0
+    off = x - (np.bincount(record, x) / sums.rows)[record]
+    return odd | (scatter > _SCATTER**2 * np.bincount(record, off**2))
 
 
 def parquet_readings(
@@ -246,27 +222,21 @@ def parquet_readings(
         InputError: a file cannot be read, or nobody answers or works at the address.
         HdcalError: the cluster was lost.
     """
-    whole = BatchSums(source)
-    for part in _in_order(source, scheduler):
-        whole.join(part)
-    return whole.readings(), whole
-
-
-def _in_order(source: Parquet, scheduler: str | None) -> Iterator[BatchSums]:
-    """Yield the sums of each file, in the order of the files whoever reads them."""
     tasks = ((place, file, source) for place, file in enumerate(source.files))
-    if scheduler is None:
-        yield from (file_sums(*task)[1] for task in tasks)
-        return
-    from hdcal.cli.cluster import completed_on_cluster
+    found: Iterator[tuple[int, BatchSums]] = (file_sums(*task) for task in tasks)
+    if scheduler is not None:
+        from hdcal.cli.cluster import completed_on_cluster
 
-    early: dict[int, BatchSums] = {}
+        found = completed_on_cluster(file_sums, tasks, scheduler, _LOST)
+    whole, early = BatchSums(source), dict[int, BatchSums]()
     following = 0
-    for place, part in completed_on_cluster(file_sums, tasks, scheduler, _LOST):
+    for place, part in found:
         early[place] = part
+        # In the order of the files, whoever reads them.
         while following in early:
-            yield early.pop(following)
+            whole.join(early.pop(following))
             following += 1
+    return whole.readings(), whole
 
 
 def file_sums(place: int, file: str, source: Parquet) -> tuple[int, BatchSums]:

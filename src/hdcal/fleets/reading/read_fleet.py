@@ -1,4 +1,7 @@
-"""Reading of many gears from any source, and the faults of their records."""
+"""Reading of many gears from any source, and the faults of their records.
+
+Gears with a fault are refused, or left out whole.
+"""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -6,16 +9,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hdcal.data.case import Case
+from hdcal.data.findings import LISTED
+from hdcal.data.full_scale import scale_of
+from hdcal.data.gear import at_full_scale
+from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.measurements.folder import read_gear_folder
 from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.measurements.parquet import open_parquet
 from hdcal.data.measurements.screened import screening_notes
 from hdcal.data.reading import read_case
+from hdcal.data.scatter import require_scatter
 from hdcal.data.tables.parquet_files import is_parquet
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.errors import Finding, Findings, InputError, quoted
+from hdcal.fleets.reading.gear_sizes import gear_sizes
 from hdcal.fleets.reading.parquet_readings import parquet_readings
 from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
+from hdcal.fleets.reading.record_faults import faults_among_gears
 from hdcal.screening.result import Observation
 
 # Findings of screening that make a gear faulty; others are dealt with, and noted.
@@ -29,19 +41,19 @@ _FAULTS = {
 }
 # Notes on records that are listed.
 _LISTED = 20
+# From fewer gears next to nothing is known about how much gears differ.
+FEWEST = 3
 
 
 def read_fleet(
     data: Any,
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
-    columns: Mapping[str, str] | None = None,
-    theory: str | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     specimen: str | None = None,
     scheduler: str | None = None,
-    range: str | None = None,
+    **how: Any,
 ) -> FleetReadings:
     """Return the readings of many gears; gears with a fault are named in its `faults`.
 
@@ -50,19 +62,16 @@ def read_fleet(
             folder with a file or a case for each gear; a Parquet file, or a folder of
             them, which are read in batches.
         gear: as in `read_case`, as are all that follow; a case has its own.
-        columns: quantity -> header.
-        theory: overrides that of the gear file.
         encoding: of text files.
         sheet: of a workbook.
         specimen: label of the only one that is read.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
-        range: working range.
+        how: columns, theory, reading and range.
 
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    how: dict = {"columns": columns, "theory": theory, "range": range}
     if is_parquet(data):
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
         return _with_faults(found, sums.left_out, sums.observed)
@@ -124,3 +133,72 @@ def _with_faults(
         notes[_LISTED:] = [f"and {more} more findings in the records"]
     case = replace(case, notes=(*case.notes, *notes))
     return replace(readings, case=case, faults=faults)
+
+
+def usable(
+    readings: FleetReadings, gears: Any = None, *, skip_bad: bool = False
+) -> FleetReadings:
+    """Return the readings of gears without a fault, at the sizes of the gear file.
+
+    Args:
+        readings: of all gears.
+        gears: table of the sizes of each gear, if they differ.
+        skip_bad: leave out gears with a fault.
+
+    Raises:
+        InputError: a gear has a fault and may not be left out, fewer than three are
+            left, none scatters about its line, or the table cannot be read.
+    """
+    bad = dict(readings.faults)
+    many = len({*readings.case.specimen_labels, *bad})
+    readings = replace(readings.without(bad), faults={})
+    with Findings() as wrong:
+        if gears is not None and readings.sizes is not None:
+            words = "the gear file of each gear states its sizes"
+            wrong.append(Finding("gears", words, "Leave it out"))
+        elif gears is not None or readings.sizes is not None:
+            table = readings.sizes if gears is None else gears
+            ratio, unsized = gear_sizes(table, readings.case)
+            bad |= unsized
+            readings = readings.at_one_size(ratio).without(unsized)
+        unlike = faults_among_gears(readings)
+        bad |= unlike
+        readings = readings.without(unlike)
+        left = len(readings.case.specimen_labels)
+        if bad and (left < FEWEST or not skip_bad):
+            wrong += _of_gears(bad)
+        if left < FEWEST:
+            wrong.append(_too_few(left, len(bad), readings.case.name))
+        elif bad and not skip_bad:
+            wrong.append(offer(bad, many))
+    require_scatter(readings.case)
+    case, records = readings.case, readings.case.records
+    # Of very many gears only the first rows are there, or none that are left.
+    if len(records.force):
+        # Shipped priors are shares of the largest readings that are left.
+        force, read = np.asarray(records.force), np.asarray(records.deformation)
+        gear = at_full_scale(case.gear, scale_of(force, read, case.gear.reading))
+        case = replace(case, gear=gear)
+    return replace(readings, case=case, sizes=None)
+
+
+def _too_few(left: int, bad: int, name: str) -> Finding:
+    words = f"{left} gear{'' if left == 1 else 's'}: how much gears differ takes "
+    words += f"{FEWEST} or more"
+    if bad:
+        words = f"of {left + bad} gears {left} can be used. {words}"
+        return Finding(name, words, "Correct what is wrong with the others")
+    remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
+    return Finding(name, words, remedy)
+
+
+def _of_gears(bad: Mapping[str, Finding]) -> list[Finding]:
+    """Return the faults of gears, each with its name."""
+    each = [
+        replace(why, problem=f"gear {quoted(gear)}: {why.problem}")
+        for gear, why in bad.items()
+    ]
+    if more := len(each[LISTED:]):
+        words = f"and {more} more gear{' has' if more == 1 else 's have'} a fault"
+        each[LISTED:] = [Finding(each[0].file, words, "Correct these too")]
+    return each

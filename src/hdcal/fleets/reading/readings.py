@@ -22,12 +22,10 @@ class FleetReadings:
     Attributes:
         case: gears, runs and notes; its records are all readings, or the first ones
             where there are very many.
-        sums: of each mounting. Gears that were pulled are mirrored: their deformation,
-            sense and force have the opposite sign.
-        side: −1 where they were pulled and mirrored, else 1.
+        sums: of each mounting; the mean has the opposite sign where gears were pulled.
+        side: −1 where they were pulled, else 1.
         size_ratio: stiffness of the sizes of each gear over that of the sizes in the
-            gear file, by which x was multiplied, shape (g,); None where all gears have
-            the sizes of the gear file.
+            gear file, by which x was multiplied, shape (g,); None without such sizes.
         sizes: sizes of each gear by column, if it has its own gear file.
         faults: gears with a fault, each with what it is; some are among the readings.
     """
@@ -56,9 +54,7 @@ class FleetReadings:
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
         """Return sums in which every gear has the sizes of the gear file.
 
-        Args:
-            ratio: stiffness of the sizes of each gear over that of these, by which its
-                deformations are multiplied, shape (g,).
+        The ratio is that of the stiffness of its sizes to that of these, shape (g,).
         """
         sums = self.sums.stretched(ratio[self.sums.gear])
         return replace(self, sums=sums, size_ratio=ratio)
@@ -112,18 +108,12 @@ def readings_of(
 ) -> FleetReadings:
     """Return the readings of a case from the sums of its mountings.
 
-    Args:
-        case: gears and runs.
-        gear: index of the gear of each mounting, ascending, shape (m,).
-        run: index of its run, shape (m,).
-        sums: of its rows.
+    The indices of gear and run are those of each mounting; gears ascend, shape (m,).
     """
     side = loading_side(np.array([sums.low.min(), sums.high.max()])) or 1
-    reach = np.maximum(np.abs(sums.low), np.abs(sums.high))
     # All components of v are odd in the deformation.
-    mean, products, lagged = side * sums.mean, sums.products, sums.lagged
-    each = MountingSums(gear, run, sums.rows, mean, products, lagged, reach)
-    return FleetReadings(case, each, side)
+    each = {**vars(sums), "mean": side * sums.mean}
+    return FleetReadings(case, MountingSums(**each, gear=gear, run=run), side)
 
 
 def modulus_left(gear: Gear, temperature):
