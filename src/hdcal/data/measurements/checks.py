@@ -71,7 +71,7 @@ def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
     """Tell which rows have a time before that of their run's last row, shape (n,)."""
     order = np.flatnonzero(np.isfinite(time))
     order = order[np.argsort(run[order], kind="stable")]
-    # A wild number may overflow here; it has a finding of its own.
+    # A wild number may overflow here; it has another finding.
     with np.errstate(over="ignore"):
         back = (np.diff(time[order]) < 0) & (np.diff(run[order]) == 0)
     faulty = np.zeros(len(time), bool)
