@@ -1,6 +1,7 @@
 """Checks of readings, whatever the rig."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -56,7 +57,7 @@ def check_reach(
     frame: pd.DataFrame, column: Column, gear: Gear, findings: FileFindings
 ) -> None:
     """Find deformations that no gear of this radius reaches."""
-    size = frame["deformation"].abs()
+    size: Any = frame["deformation"].abs()
     beyond = size[(size >= gear.reach) & ~size.index.isin([*findings.rows])]
     radius = f"a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
