@@ -21,17 +21,6 @@ from hdcal.data.units import unit_names
 from hdcal.errors import InputError
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
-MATERIAL = """
-E0 = {{ family = "fixed", value = {E0!r}, unit = "MPa" }}
-alpha = {{ family = "fixed", value = {alpha!r}, unit = "1/K" }}
-poisson = {{ family = "fixed", value = {poisson!r} }}
-density = {{ family = "fixed", value = {density!r} }}
-cte = {{ family = "fixed", value = {cte!r} }}
-yield_strength = {{ family = "fixed", value = {yield_strength!r} }}
-"""
-STEEL = {"E0": 2e5, "alpha": 3e-4, "poisson": 0.3, "density": 7.8e-9}
-STEEL |= {"cte": 1e-5, "yield_strength": 800.0}
-UNITS = {"E0": "MPa", "alpha": "1/K", "mass": "N*s^2/mm"}
 KEYS = (
     *("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm"),
     *("gear.load_height_mm", "gear.nominal_deformation_mm", "rig.filter_Hz"),
@@ -40,12 +29,6 @@ KEYS = (
     *("measurement.force_calibration.k", "measurement.force_calibration.expanded_N"),
     "measurement.temperature_calibration.expanded_K",
     "measurement.force_calibration.expanded_percent",
-)
-PRIORS = (
-    *("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma", "mass"),
-    *("run_offset_sd", "specimen_sd", "gap_sd", "gap_length", "damping_ratio"),
-    *("initial_deformation", "initial_velocity", "deformation_sigma"),
-    *("noise_correlation", "seating_slack.clearance"),
 )
 
 
@@ -81,37 +64,12 @@ def gear_key(key: str, value, folder: Path) -> None:
     read_gear(folder / "gear.toml")
 
 
-def prior(key: str, value, folder: Path, family="fixed", size="value", rest="") -> None:
-    """Read a gear file with one such prior."""
-    unit = f', unit = "{UNITS[key]}"' if key in UNITS else ""
-    entry = f'{key} = {{ family = "{family}", {size} = {value!r}{rest}{unit} }}'
-    (folder / "gear.toml").write_text(f"{GEAR}[priors]\n{entry}\n")
-    read_gear(folder / "gear.toml")
-
-
-def material(name: str, value, folder: Path) -> None:
-    """Read a material file with one such number."""
-    (folder / "my.toml").write_text(MATERIAL.format(**{**STEEL, name: value}))
-    (folder / "gear.toml").write_text(GEAR + 'material = "my.toml"\n')
-    read_gear(folder / "gear.toml")
-
-
 def read_entries() -> Iterator[tuple[str, str, Callable]]:
     """Yield the quantity, the name of its place, and what reads it from a file."""
     for name in DIMENSIONS:
         yield name, header(name), partial(column, name)
     for key in KEYS:
         yield quantity_of(key), key, partial(gear_key, key)
-    for name in STEEL:
-        yield name, f"{name}.value", partial(material, name)
-    for name in PRIORS:
-        quantity = "effect" if "." in name else NAMES.get(name, name)
-        yield quantity, f"priors.{name}.value", partial(prior, name)
-    spread = {"family": "lognormal", "size": "log_sd", "rest": ", median = 2.0"}
-    yield "log_sd", "priors.K.log_sd", partial(prior, "K", **spread)
-    shape = {"family": "beta", "size": "a", "rest": ", b = 1.0"}
-    name = "seating_slack.clearance"
-    yield "beta", f"priors.{name}.a", partial(prior, name, **shape)
 
 
 # Each call is refused for another reason as well, so that nothing is computed.
@@ -196,12 +154,7 @@ def outside(quantity: str) -> list[float]:
 def test_a_number_of_a_file_is_refused_just_outside_its_range(entry, tmp_path: Path):
     quantity, place, read = entry
     for value in outside(quantity):
-        # A negative size of a prior is refused for its sign already.
-        if value <= 0.0 and place.startswith(("priors.", *STEEL)):
-            with pytest.raises(InputError):
-                read(value, tmp_path)
-        else:
-            assert place in outside_names(partial(read, value, tmp_path)), value
+        assert place in outside_names(partial(read, value, tmp_path)), value
     high = RANGES[quantity].high
     inside = high - 1e-9 if RANGES[quantity].inner else high
     assert place not in outside_names(partial(read, inside, tmp_path))

@@ -13,7 +13,7 @@ X = np.linspace(0.0, 10.0, 200)
 def table(headers: list[str], *columns: np.ndarray) -> str:
     """Return the text of a CSV file."""
     rows = [",".join(f"{cell:.5g}" for cell in row) for row in np.transpose(columns)]
-    return "\n".join([",".join(headers), *rows] if headers else rows)
+    return "\n".join([",".join(headers), *rows])
 
 
 def force(x: np.ndarray, seed: int = 1) -> np.ndarray:
@@ -28,19 +28,11 @@ def swaying(x: np.ndarray) -> np.ndarray:
 TWICE = np.r_[X, X]
 CLOCK = {"displacement_mm": TWICE, "force_N": force(TWICE), "time_s": np.r_[X, X]}
 GAUGES = table(["Force [N]", "LVDT 1 [mm]", "LVDT 2 [mm]"], force(X), X, 1.7 * X)
-NO_HEADERS = table([], X, force(X))
 NO_UNITS = table(["displacement", "load"], X, force(X))
-STRAIGHT = {"displacement_mm": X, "force_N": force(X)}
 SWAYING = {"displacement_mm": X, "force_N": swaying(X)}
 QUESTIONS = {
     "a new test": (CLOCK, {}, "a column 'run'", {"run": [1] * 200 + [2] * 200}),
     "two gauges": (GAUGES, {}, "by its number", {"columns": {"deformation": "2"}}),
-    "no headers": (
-        NO_HEADERS,
-        {},
-        "Say which column is which",
-        {"columns": {"deformation": "1[mm]", "force": "2[N]"}},
-    ),
     "no units": (
         NO_UNITS,
         {},
@@ -48,12 +40,6 @@ QUESTIONS = {
         {"columns": {"deformation": "displacement[mm]", "force": "load[N]"}},
     ),
     "a falling force": (SWAYING, {}, "by `range`", {"range": "2.05:3.95"}),
-    "an empty range": (
-        STRAIGHT,
-        {"range": "12:14"},
-        "read from 0 to 10 mm",
-        {"range": "2:4"},
-    ),
 }
 
 

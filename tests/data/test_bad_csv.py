@@ -69,7 +69,7 @@ ONE = [
         timed(*"12345", header=H.replace("\n", ",force_kN\n")),
         1,
         "force_kN",
-        "two columns",
+        "the force may be",
     ),
     (fourth("nan"), 4, "force_N", "not a number"),
     (fourth("1e999"), 4, "force_N", "too large"),

@@ -124,14 +124,6 @@ def test_a_block_of_other_columns_is_left_out_or_refused(tmp_path):
     assert any("Split the file" in one for one in refused(tmp_path, many))
 
 
-def test_a_column_that_is_not_used_is_no_obstacle(tmp_path):
-    other = ["1.5"] * 5 + ["OVL", "-", "nan", "1,5", "x", "", "1e999"]
-    text = "deformation_mm;gauge;force_N\n" + rows(X, other, F, separator=";")
-    check(read(tmp_path, text))
-    volts = "Travel (in V),Force (in V),Travel (in mm),Force (in N)\n"
-    check(read(tmp_path, volts + rows(X / 3, F / 50, X, F)))
-
-
 def test_a_clock_that_is_reset_is_not_used(tmp_path):
     clock = [*range(9), 0, 1, 2]
     case = read(tmp_path, "Time [s],Travel [mm],Load [N]\n" + rows(clock, X, F))
@@ -140,14 +132,6 @@ def test_a_clock_that_is_reset_is_not_used(tmp_path):
     text = "specimen,time_s,Travel [mm],Load [N]\n"
     (found,) = refused(tmp_path, text + rows(["A"] * 6 + ["B"] * 6, clock, X, F))
     assert "row 11" in found and "'B'" in found
-
-
-def test_columns_without_headers_are_named_by_number(tmp_path):
-    text = "# group: g7\n# name: Time   name: Travel   name: Force\n"
-    text += rows(range(12), X, F, separator=" , ")
-    (found,) = refused(tmp_path, text)
-    assert "3 columns" in found and "'deformation=1[mm]'" in found
-    check(read(tmp_path, text, columns={"deformation": "2[mm]", "force": "3[N]"}))
 
 
 def test_torques_and_angles_are_converted(tmp_path):

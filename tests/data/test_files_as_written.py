@@ -56,10 +56,6 @@ FILES = {
     "Windows-1252 with a degree sign": (
         *(GERMAN.encode("cp1252"), {"temperature": TEMPERATURE}),
     ),
-    "Windows-1252 with micrometres": (
-        text("Weg [µm];Kraft [N]\n", lines(";", ",", stretch=1e3)).encode("cp1252"),
-    ),
-    "French": (text("Déplacement (mm);Effort (N)\n", SEMI),),
     "Chinese": (text("位移(mm),力(N)\n", BODY),),
     "Chinese in GB18030": (
         text("试验报告\n位移(mm),载荷(kN)\n", lines(force=1e3)).encode("gb18030"),
@@ -82,11 +78,6 @@ FILES = {
     ),
     "a footer": (
         text("deformation_mm,force_N\n", BODY, "\nEnd of test\nOperator: M. K.\n"),
-    ),
-    "a logger started twice": (
-        text("Weg [mm];Kraft [N]\n", SEMI[:3], "\n\nMessung 2\n")
-        + text("Weg [mm];Kraft [N]\n", SEMI[3:]),
-        TWO_RUNS,
     ),
     "LabVIEW, a block for each run": (
         LABVIEW
@@ -121,7 +112,6 @@ FILES = {
         + "".join(f"{'' if k % 3 else 'AB'[k // 3]},{r}" for k, r in enumerate(BODY)),
         {"specimen": TWO_RUNS["run"]},
     ),
-    "a temperature without a unit": (text("Weg [mm];Kraft [N];Temperatur\n", WARM),),
 }
 
 

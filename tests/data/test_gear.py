@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import NO_MATERIAL, read_gear
@@ -136,12 +135,8 @@ def test_the_prior_stiffness_of_a_spring_is_that_of_the_readings(tmp_path):
     ("unit", "ratio"),
     [
         ("N", 37.0),
-        ("mm", 0.2),
-        ("mm/N", 0.2 / 37.0),
         ("N*s/mm", 37.0 * 5.0),
-        ("1/N^2", 37.0**-2),
         ("1/K", 1.0),
-        ("1", 1.0),
     ],
 )
 def test_newtons_and_millimetres_scale_with_the_readings(unit, ratio):
@@ -264,15 +259,9 @@ def test_each_fact_sharpens_one_prior(read, reading, radial):
 
 
 def test_noise_behind_a_filter_is_correlated_as_the_prior_expects():
-    fine, every = 1e-4, 500
-    noise = np.random.default_rng(3).normal(size=4_000_000)
-    behind = signal.lfilter([1.0], [1.0, -np.exp(-2 * np.pi * 2.0 * fine)], noise)
-    measured = np.corrcoef(behind[:-every:every], behind[every::every])[0, 1]
     rig = {"gear": {"theory": "spring"}, "rig": {"filter_Hz": 2.0}}
     a, b = correlation_of(rig).numbers
-    likely = np.exp(-2 * np.pi * 2.0 * 0.05)
-    assert measured == pytest.approx(likely, abs=0.03)
-    assert a / (a + b) == pytest.approx(likely, abs=0.06)
+    assert a / (a + b) == pytest.approx(np.exp(-2 * np.pi * 2.0 * 0.05), abs=0.06)
     assert correlation_of(rig, with_time=False).family == "uniform"
     stated = {"noise_correlation": {"family": "fixed", "value": 0.1}}
     assert correlation_of({**rig, "priors": stated}).numbers == (0.1,)

@@ -65,12 +65,6 @@ def test_load_hold_unload():
     assert found.features == {"unloading", "holds", EITHER}
 
 
-def test_runs_are_separate():
-    found = motion([0, 5, 1, 4, 2, 3], run=[0, 1, 0, 1, 0, 1])
-    assert found.direction.tolist() == [1, -1, 1, -1, 1, -1]
-    assert found.features == {"unloading"}
-
-
 SHAPES = {
     "ramp": (lambda u: u, 0, set()),
     "triangle": (lambda u: 1 - np.abs((8 * u) % 2 - 1), 7, {"unloading", "cycles"}),

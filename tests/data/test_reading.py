@@ -95,16 +95,6 @@ def test_optional_columns_convert_and_become_known(folder, header, name, value):
     assert records.force[1] == pytest.approx(2e4)
 
 
-def test_absent_covariates_are_neutral(folder):
-    gear = folder / "gear.toml"
-    gear.write_text(gear.read_text() + "reference_temperature_C = 23.5\n")
-    records = read_case(folder).records
-    assert np.array_equal(records.temperature, np.full(6, 23.5))
-    for name in ("time", "angle", "rate", "force_sd", "run", "specimen"):
-        assert not getattr(records, name).any()
-    assert records.known == frozenset()
-
-
 def test_labels_become_indices_in_order_of_appearance(folder):
     content = "deformation_mm;force_N;run;specimen\n" + "".join(
         f"0.{i};{i}.5;{run};{gear}\n"

@@ -12,40 +12,28 @@ from hdcal.data.units import SIZES, UNITS, UnitError, find_unit, to_code
 PRIORS = {
     "": (1.0, "1"),
     "N": (1.0, "N"),
-    "kgf": (9.80665, "N"),
     "lbf": (4.4482216152605, "N"),
     "µm": (1e-3, "mm"),
-    "in": (25.4, "mm"),
-    "min": (60.0, "s"),
     "°C": (1.0, "K"),
-    "degF": (5 / 9, "K"),
     "deg": (math.pi / 180, "1"),
     "%": (1e-2, "1"),
     "GPa": (1e3, "MPa"),
-    "bar": (0.1, "MPa"),
     "psi": (0.006894757, "MPa"),
     "kg": (1e-3, "N*s^2/mm"),
-    "N/mm**2": (1.0, "MPa"),
     "1e-4/K": (1e-4, "1/K"),
     "kg/m^3": (1e-12, "N*s^2/mm^4"),
     "N·s/m": (1e-3, "N*s/mm"),
-    "1/hour": (1 / 3600, "1/s"),
 }
 # Reading 300 of each unit of a column, in mm, N, N*m, rad, s and °C.
 COLUMNS = {
     "K": 26.85,
     "°F": (300 - 32) * 5 / 9,
     "gf": 2.941995,
-    "mN": 0.3,
     "kN": 3e5,
-    "kip": 300 * 4448.2216152605,
     "ozf": 300 * 4.4482216152605 / 16,
-    "mil": 7.62,
-    "um": 0.3,
     "arcmin": math.radians(5),
     "N·m": 300.0,
     "lbf·in": 300 * 4.4482216152605 * 0.0254,
-    "sec": 300.0,
 }
 
 

@@ -37,15 +37,6 @@ def test_cut_rows_leave_the_records():
     assert any("wild" in note and "rows 32, 72" in note for note in case.notes)
 
 
-def test_rows_after_a_jump_are_a_run_of_their_own():
-    frame = table()
-    frame.loc[60:, "force_N"] += 11.0
-    case = hdcal.read_case(frame)
-    assert case.run_labels == ("1", "1 (zero 2)")
-    np.testing.assert_array_equal(case.records.run, np.arange(ROWS) >= 60)
-    assert np.ptp(case.records.force) == pytest.approx(20.0, abs=0.2)
-
-
 def test_direction_is_not_derived_from_a_trembling_gauge():
     frame = table()
     frame["deformation_mm"] += RNG.normal(0.0, 0.1, ROWS)
@@ -85,7 +76,7 @@ def test_what_a_part_gave_way_at_is_not_predicted(tmp_path):
     frame = table()
     frame["deformation_mm"] += 120.0
     frame.loc[84:, "force_N"] = 1.0
-    broken = hdcal.calibrate(hdcal.read_case(frame), warmup=300, draws=300)
+    broken = hdcal.calibrate(hdcal.read_case(frame), warmup=500, draws=1000)
     (low, high) = broken.case.excluded[0]
     assert low == pytest.approx(120.7, abs=0.01) and high == np.inf
     for at in (120.8, 121.2):

@@ -134,7 +134,7 @@ class Case:
         return self._check()._repr_html_()
 
     def to_frame(self) -> "pd.DataFrame":
-        """Return the readings that were measured, under hdcal's own headers."""
+        """Return what was measured, under the headers of hdcal's files."""
         import pandas as pd
 
         records = self.records

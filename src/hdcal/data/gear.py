@@ -128,11 +128,11 @@ def _assemble(
 
 
 def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
-    """Return a gear whose shipped priors are those of its own rig.
+    """Return a gear with shipped priors at the scale of its rig.
 
     What the gear file states stays. A force zero that nobody states may be anywhere:
     in the sum of both zeros, which is all that readings show, the deformation's keeps
-    its own size.
+    its size.
     """
     shipped = rig_priors()
     shipped["K"] = shipped["spring_stiffness"]

@@ -105,7 +105,7 @@ def derive_motion(
         clock = None if time is None else time[rows]
         moves.append(_one_run(deformation[rows], clock, rows, direction, rate))
         if moves[-1]:
-            # The last movement's sign holds on through the rests.
+            # A rest keeps the sign of the last movement.
             moved, place = direction[rows] != 0, np.arange(rows.size)
             last = np.maximum.accumulate(np.where(moved, place, -1))
             first = moves[-1][0].sign

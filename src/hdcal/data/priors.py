@@ -226,7 +226,7 @@ def read_entries(
 def read_priors(
     source: Traversable | Path, units: Mapping[str, str], file: str = ""
 ) -> dict[str, Prior]:
-    """Read a prior file whose top-level tables are parameters.
+    """Read a prior file, in which the top-level tables are parameters.
 
     Raises:
         InputError: holds everything that is wrong with the file.

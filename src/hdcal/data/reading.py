@@ -19,7 +19,7 @@ from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
 _NEARBY = f"the gear file is the {GEAR_NAME} next to the data"
-# The note where no gear file was named, and none lies beside the data.
+# The note where no gear file was named, and none lies next to the data.
 UNSIZED = (
     f"{ASSUMED}without a gear file the part is a spring: the result is its stiffness, "
     "and no K. K needs the sizes in a gear file, which is named or is the file "
@@ -47,15 +47,15 @@ def read_case(
             files.
         gear: a gear file, or its content as a mapping, as in
             `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
-            default the gear.toml beside the data, and where there is none a spring of
-            which only the stiffness is asked.
+            default the gear.toml next to the data, and without one a spring of which
+            only the stiffness is asked.
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
         theory: overrides the gear file's theory.
         encoding: encoding of a CSV file; by default the likeliest.
         sheet: sheet of a workbook; by default the one with readings.
-        specimen: label of the one whose rows are wanted; by default all of them.
+        specimen: label of the only one that is read; by default all of them.
         skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
         range: working range; rows outside it are left out: `0.1:0.6` of the

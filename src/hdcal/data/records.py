@@ -87,7 +87,7 @@ _FAR = 1.0
 
 
 def lies_far(records: Records) -> bool:
-    """Return whether deformations lie far from their origin, beside their range."""
+    """Return whether deformations lie far from their origin for their range."""
     low, high = float(np.min(records.deformation)), float(np.max(records.deformation))
     return abs(low + high) / 2.0 > _FAR * (high - low)
 

@@ -71,7 +71,7 @@ SIZES: dict[str, dict[str, float]] = {
 }
 # Reading in a unit at the zero of °C.
 _ZEROS = {"K": 273.15, "F": 32.0}
-# What priors are written in beside these: sizes in N, mm, s and K, and their powers.
+# Further units of priors: sizes in N, mm, s and K, and their powers.
 _OF_PRIORS = {
     "MPa": (1.0, (1, -2, 0, 0)),
     "Pa": (1e-6, (1, -2, 0, 0)),

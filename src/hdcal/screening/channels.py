@@ -65,7 +65,7 @@ _LEVEL = 1e-4
 _MATTERS = 1e-3
 # Least correlation, with the other sign, of second differences with the next ones.
 _ALTERNATES = 0.3
-# Turning points cannot be seen when ten sd of the scatter are more than this share of
+# Turning points are hidden when ten sd of the scatter are more than this share of
 # the range: the largest reversal that noise may hide.
 HIDDEN = 0.2
 

@@ -205,7 +205,7 @@ def _jump(
 def _measured(
     x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
 ) -> Jump:
-    """Return a jump with its size, in the channel that leaves its own sequence."""
+    """Return a jump with its size, in the channel that leaves its sequence."""
     sides = slice(max(row - reach, 0), row), slice(row, row + reach)
     dx, dy = (
         np.concatenate([values[side] - values[side].mean() for side in sides])

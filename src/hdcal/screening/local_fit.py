@@ -19,7 +19,7 @@ _SOME = 4000
 # Quotient of the 95 % and the 50 % quantile of |t|, by degrees of freedom.
 _DOFS = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 8.0])
 _TAILS = np.array([12.7, 5.27, 4.16, 3.75, 3.54, 3.26])
-# From fewer values the tail of a distribution cannot be seen; it counts as heavy.
+# From fewer values the tail of a distribution does not show; it counts as heavy.
 _FEW = 40
 _FEW_DOF = 3.0
 # A fault is believed a priori in one of some hundred records: log of these odds.

@@ -62,7 +62,7 @@ class Observation:
         run: index of the run.
         where: the rows as their file names them.
         words: the finding in a sentence without a full stop.
-        gear: label of the gear whose record it is.
+        gear: label of the gear.
     """
 
     kind: Kind
@@ -135,7 +135,7 @@ class Screening:
 
     @property
     def excluded(self) -> tuple[tuple[float, float], ...]:
-        """Deformations whose rows were left out, beyond those that stayed [mm].
+        """Deformations of rows that were left out, beyond those that stayed [mm].
 
         Where the force has dropped for good all that lies farther is excluded.
         """

@@ -178,7 +178,7 @@ def _wild(one: Run) -> None:
 
 
 def _jumps(one: Run) -> bool:
-    """Give the rows after each jump a zero of their own, and tell whether any did."""
+    """Give the rows after each jump another zero, and tell whether there is a jump."""
     found: dict[int, Jump] = {}
     as_read = one.x.copy(), one.y.copy()
     for _ in range(2 * _MOST_JUMPS):

@@ -21,14 +21,14 @@ _BRANCH = 0.2
 # standard errors beyond which it is no chance.
 _CLEAR = 0.9
 _CHANCE = 3.5
-# From more rows on the scatter of the deformation can be seen, and is looked for.
+# From more rows on the scatter of the deformation shows, and is looked for.
 _MOST_ROWS = 40
 # What the residuals of a line with independent noise rarely exceed: the largest one,
 # in sd, and the correlation of each with the next one, in its standard errors.
 _LARGEST, _CORRELATED = 2.8, 2.0
 # Share of the range of the force that is noise at most.
 _NOISE = 0.05
-# Rows from which the sign of a slope can be told.
+# Rows that show the sign of a slope.
 _FEWEST_FOR_SIGN = 5
 
 

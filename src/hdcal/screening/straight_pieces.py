@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.screening.local_fit import RESOLVED
 from hdcal.screening.turning_points import noise_sd
 
-# Rows of a movement from which on it is seen whether it is straight.
+# Rows of a movement that show whether it is straight.
 SHOWN = 20
 # The curve is cut into straight pieces between this many points, means of rows.
 _POINTS = 120
@@ -23,7 +23,7 @@ _PARAMETERS = 3.0
 _MARGIN = 0.1
 # Share of the readings that is no more than rounding of what was computed.
 DIGITS = 1e-9
-# Points from which on noise that remembers can be told from a kink: ten for each piece.
+# Points that distinguish correlated noise from a kink: ten for each piece.
 _FEWEST_FOR_MEMORY = 10 * _PIECES
 
 
@@ -127,7 +127,7 @@ def _pieces(x: np.ndarray, y: np.ndarray, *, both: bool) -> tuple[list[int], flo
     # dearer where few points are left to tell the noise
     criterion += paid * np.log(points) * points / np.maximum(points - paid - 1.0, 1.0)
     chosen = _edges(came, points, int(np.argmin(criterion)) + 1)
-    # Fewer pieces follow less of the noise, and leave more of its memory to be seen.
+    # Fewer pieces follow less of the noise, and show more of its correlation.
     return chosen, _inflation(x, y, chosen, both=both)
 
 

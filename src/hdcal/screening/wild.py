@@ -77,7 +77,7 @@ def _leaves(order: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarr
 
 
 def _step(y: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return a large but usual step of the force near each row, its own left out."""
+    """Return a large but usual step of the force near each row."""
     offsets = np.r_[-REACH:0, 2 : REACH + 2]
     steps = windows(np.abs(np.diff(y, prepend=y[0])), rows, offsets)
     return quantile(steps, 0.75)

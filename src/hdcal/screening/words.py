@@ -9,7 +9,7 @@ from hdcal.screening.result import Kind, Observation
 
 # Stretches of rows that one sentence names.
 _LISTED = 4
-_ZERO = "the rows from there on are moved back by it, as a run with its own zero"
+_ZERO = "the rows from there on are moved back by it, as a run with another zero"
 _CUT = "{count} left out ({rows}): "
 _SENTENCES: dict[Kind, str] = {
     "before the tare": "{count} at the beginning left out ({rows}): read before the "

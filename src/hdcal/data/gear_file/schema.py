@@ -66,7 +66,7 @@ class MeasurementTable(BaseModel):
 
 
 class GearFile(BaseModel):
-    """A whole gear file; priors have a reader of their own."""
+    """A whole gear file; `read_entries` reads its priors."""
 
     model_config = STRICT
     gear: GearTable
@@ -134,7 +134,7 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
 
 
 def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Return which sizes cannot be beside the others: name, problem and remedy."""
+    """Return which sizes contradict the others: name, problem and remedy."""
     radius = size.get("radius", math.inf)
     both = "Check both sizes"
     faults = [

@@ -1,6 +1,7 @@
 """Checks of readings, whatever the rig."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -47,44 +48,33 @@ def check_rows(
         known = RANGES[column.quantity]
         slack = _ROUNDED if quantity == "temperature" else 0.0
         wild = (values < known.low - slack) | (values > known.high)
-        _add(
-            frame,
-            wild,
-            (known.problem(), "Check the number and its unit"),
-            column,
-            findings,
-        )
+        words = known.problem(), "Check the number and its unit"
+        rows = frame.index[wild].tolist()
+        findings.add_rows(((row, *words) for row in rows), column.header)
 
 
 def check_reach(
     frame: pd.DataFrame, column: Column, gear: Gear, findings: FileFindings
 ) -> None:
     """Find deformations that no gear of this radius reaches."""
-    beyond = np.abs(frame["deformation"].to_numpy()) >= gear.reach
-    words = f"no gear with a radius of {gear.geometry.radius:g} mm is deformed so far"
+    size: Any = frame["deformation"].abs()
+    beyond = size[(size >= gear.reach) & ~size.index.isin([*findings.rows])]
+    radius = f"a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
-    beyond &= ~np.isin(frame.index, [*findings.rows])
-    _add(frame, beyond, (words, remedy), column, findings)
+    faults = (
+        (int(row), f"a deformation of '{far:g} mm' on {radius}", remedy)
+        for row, far in beyond.items()
+    )
+    findings.add_rows(faults, column.header)
 
 
 def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
     """Tell which rows have a time before that of their run's last row, shape (n,)."""
     order = np.flatnonzero(np.isfinite(time))
     order = order[np.argsort(run[order], kind="stable")]
-    # A wild number may overflow here; it has a finding of its own.
+    # A wild number may overflow here; it has another finding.
     with np.errstate(over="ignore"):
         back = (np.diff(time[order]) < 0) & (np.diff(run[order]) == 0)
     faulty = np.zeros(len(time), bool)
     faulty[order[1:][back]] = True
     return faulty
-
-
-def _add(
-    frame: pd.DataFrame,
-    wrong: np.ndarray,
-    words: tuple[str, str],
-    column: Column,
-    findings: FileFindings,
-) -> None:
-    rows = frame.index[wrong].tolist()
-    findings.add_rows(((row, *words) for row in rows), column.header)

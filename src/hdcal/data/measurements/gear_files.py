@@ -31,7 +31,7 @@ def gear_files(data: Any) -> list[Path]:
 
 
 def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
-    """Return the names of the gears, and whether each has a folder of its own.
+    """Return the names of the gears, and whether each has a folder.
 
     Raises:
         InputError: some have one and some not, or two have the same name.

@@ -116,7 +116,7 @@ def read_measurements(
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
         encoding: encoding of a text; by default the likeliest.
         sheet: sheet of a workbook; by default the one with readings.
-        gear: whose radius bounds the deformations; None where it is unknown.
+        gear: its radius bounds the deformations; None where it is unknown.
         skip_bad: True leaves out gears with a faulty row, whole; False refuses them
             and mentions this option.
 

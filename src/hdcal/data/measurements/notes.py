@@ -87,7 +87,7 @@ def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator
 
 
 def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[str]:
-    """Yield by what mountings are told apart, where no column `run` does that."""
+    """Yield what distinguishes mountings, where no column `run` does that."""
     telling = [name for name in TELLING if name in stated]
     if "run" not in stated and runs > gears and telling:
         yield (

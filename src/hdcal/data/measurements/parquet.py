@@ -33,6 +33,7 @@ from hdcal.data.tables.parquet_files import (
     plain_columns,
 )
 from hdcal.data.tables.shapes import table_of
+from hdcal.data.tables.sources import file_sha256
 
 if TYPE_CHECKING:
     from pyarrow import Schema, Table
@@ -73,10 +74,7 @@ class Parquet:
     @property
     def sha256(self) -> str:
         """Hash of the file, or of the hashes of several."""
-        each = []
-        for name in self.files:
-            with open(name, "rb") as file:
-                each.append(hashlib.file_digest(file, "sha256").hexdigest())
+        each = [file_sha256(name) for name in self.files]
         several = hashlib.sha256("".join(each).encode()).hexdigest()
         return each[0] if len(each) == 1 else several
 

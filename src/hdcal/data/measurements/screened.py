@@ -67,8 +67,10 @@ def screened(
         return screened(left, wanted, whole=whole)
     if wanted is not None:
         if wanted.unit == STRAIGHT and result.straight is None:
-            words = "is straight, and the data are of several runs, or of cycles whose "
-            words += "movements are no straight lines"
+            words = (
+                "is straight, and the data are of several runs, or of cycles without "
+            )
+            words += "straight movements"
             raise InputError([Finding("range", words, FORM)])
         result = in_range(result, wanted, run, units)
     reach, each = result.working_range, result.observations

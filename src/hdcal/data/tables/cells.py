@@ -115,9 +115,10 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
 def _plain_floats(cells: np.ndarray, marks: str) -> np.ndarray | None:
     """Return texts as floats if all are finite numbers with one of the marks."""
     texts = cells.tolist()
-    if not texts or not all(isinstance(text, str) for text in texts):
+    try:
+        joined = "\n".join(texts)
+    except TypeError:  # stored numbers among them
         return None
-    joined = "\n".join(texts)
     used = {mark for mark in ".," if mark in joined}
     if len(used) > 1 or not used <= {*marks}:
         return None

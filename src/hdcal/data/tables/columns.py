@@ -65,7 +65,7 @@ def choose_columns(
     these are angle and torque.
 
     Args:
-        table: whose headers are read.
+        table: the readings with their headers.
         mapping: quantity -> header with the unit in square brackets.
         quantities: quantities to look for.
         required: those that must be there.
@@ -110,7 +110,7 @@ def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
 
 
 def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
-    """Return the name of each column for `columns`, but for hdcal's own headers."""
+    """Return the name of each column for `columns`, but for those of hdcal's files."""
     named = {}
     for column in used.values():
         quantity, header = column.quantity, parse_header(column.header)
@@ -240,7 +240,7 @@ class _Chooser:
         return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
 
     def _where(self, fits: Callable[[Header], bool]) -> list[int]:
-        """Return the columns whose header fits, without those that have no cells."""
+        """Return the columns with a fitting header and any cells."""
         headers, empty = enumerate(self._headers), self._table.empty
         return [place for place, h in headers if place not in empty and fits(h)]
 
@@ -329,7 +329,7 @@ def _refuse_conflicts(
         other = owners.setdefault(column.position, quantity)
         if other != quantity:
             words = f"is used both as {other} and as {quantity}"
-            remedy = "Give each quantity a column of its own"
+            remedy = "Give each quantity another column"
             findings.add(words, remedy, table.header_row, column.header)
         unit = table.conflicts.get(column.position)
         if unit and column.unit is not None and not column.against:

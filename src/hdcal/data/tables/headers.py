@@ -200,7 +200,7 @@ def _quantity(name: str, words: list[str], unit: Unit | None) -> tuple[str, set[
         turned = {_TURNING.get((q, unit.dimension), q): named[q] for q in named}
         fits = {q: h for q, h in turned.items() if DIMENSIONS.get(q) == unit.dimension}
         named = fits or {q: h for q, h in turned.items() if q in DIMENSIONS} or turned
-    # An operator beside a gauge does not name what it reads.
+    # An operator in the name of a gauge is not what it reads.
     named = {q: hits for q, hits in named.items() if q not in GROUPINGS} or named
     if len(named) != 1:
         return "", set()

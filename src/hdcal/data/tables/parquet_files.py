@@ -39,7 +39,7 @@ def parquet_files(path: Path) -> list[str]:
     if not path.is_dir():
         return [str(path)]
     files = (one for one in path.rglob("*.parquet") if one.is_file())
-    # Files that engines leave beside their own begin so.
+    # Files that engines add to their tables begin so.
     return sorted(str(one) for one in files if one.name[0] not in "._")
 
 

@@ -116,6 +116,10 @@ def _file_table(
         grid, notes = text_grid(text)
         notes = [*guessed, *notes]
     table = table_of(grid, findings)
+    return replace(table, notes=(*notes, *table.notes)), file_sha256(path)
+
+
+def file_sha256(path: Path | str) -> str:
+    """Return the hash of a file."""
     with open(path, "rb") as stream:
-        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-    return replace(table, notes=(*notes, *table.notes)), sha256
+        return hashlib.file_digest(stream, "sha256").hexdigest()

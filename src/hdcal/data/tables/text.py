@@ -12,7 +12,7 @@ from hdcal.data.tables.cells import is_number
 from hdcal.data.tables.grid import SEPARATORS, Grid, SourceLine, split_line
 
 LARGEST_FILE = 1 << 30
-_LONG_LINE = re.compile(rb"[^\r\n]{1048577}")
+_LONGEST_LINE = 1 << 20
 # Encodings that test machines write other than Unicode: Western Europe, China, Japan.
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
@@ -44,10 +44,10 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
     raw = path.read_bytes()
     if not (wide or raw.startswith(_WIDE_MARKS)) and b"\0" in raw:
         findings.refuse("is a binary file", "Save it as UTF-8 text")
-    if found := _LONG_LINE.search(raw):
-        words = "has a line of more than 1 MiB, so it is no table of readings"
-        row = raw.count(b"\n", 0, found.start()) + 1
-        findings.refuse(words, "Write one row of readings per line", row)
+    for row, line in enumerate(raw.splitlines(), 1):
+        if len(line) > _LONGEST_LINE:
+            words = "has a line of more than 1 MiB, so it is no table of readings"
+            findings.refuse(words, "Write one row of readings per line", row)
     return raw
 
 
@@ -120,25 +120,36 @@ def text_grid(text: str) -> tuple[Grid, list[str]]:
         separator = max(";\t", key=first.count)
         separator = separator if separator in first else ","
         width = len(split_line(first, separator))
-    is_open = [line.count('"') % 2 == 1 for line in lines]
-    cells = [
-        [line] if alone else split_line(line, separator)
-        for line, alone in zip(lines, is_open, strict=True)
-    ]
-    # No line with an open quotation mark is one of readings.
-    counts = np.where(is_open, 0, [*map(len, cells)])
+    quoted = '"' in text
+    counts = np.array([_count(line, separator) for line in lines])
     filled = np.array([bool(line.strip(_BLANKS)) for line in lines])
-    widest = _heading_width(cells, counts, width)
+    widest = _heading_width(lines, separator, counts, width)
     fits = filled & (counts >= width) & (counts <= widest)
     loose = tuple(
-        SourceLine(row + 1, cells[row], fits=False)
+        SourceLine(row + 1, _cells_of(lines[row], separator), fits=False)
         for row in np.flatnonzero(filled & ~fits).tolist()
     )
     rows = np.flatnonzero(fits)
-    padded = [cells[row] + [""] * int(widest - counts[row]) for row in rows.tolist()]
-    columns = [np.array(column, object) for column in zip(*padded, strict=True)]
-    columns = columns or [np.array([], object)] * widest
+    padded = [lines[r] + separator * int(widest - counts[r]) for r in rows.tolist()]
+    if quoted:
+        flat = [cell for line in padded for cell in split_line(line, separator)]
+    else:
+        flat = [cell.strip() for cell in separator.join(padded).split(separator)]
+    columns = [np.array(flat[place::widest], object) for place in range(widest)]
+    columns = columns if padded else [np.array([], object)] * widest
     return Grid(rows + 1, columns, loose, separator), notes
+
+
+def _count(line: str, separator: str) -> int:
+    """Return the number of cells of a line; 0 where a quotation mark stays open."""
+    if '"' not in line:
+        return line.count(separator) + 1
+    return 0 if line.count('"') % 2 else len(split_line(line, separator))
+
+
+def _cells_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, or the line where a quotation mark stays open."""
+    return [line] if line.count('"') % 2 else split_line(line, separator)
 
 
 def _dialect(lines: list[str]) -> tuple[str, int]:
@@ -182,15 +193,18 @@ def _parted(line: str, separator: str) -> list[str]:
     return cells if plain else []
 
 
-def _heading_width(cells: list[list[str]], counts: np.ndarray, width: int) -> int:
+def _heading_width(
+    lines: list[str], separator: str, counts: np.ndarray, width: int
+) -> int:
     """Return the cells of a line of headers, some of which may name remarks."""
     header = width
-    for row, count in enumerate(counts.tolist()):
+    for line, count in zip(lines, counts.tolist(), strict=True):
+        cells = _cells_of(line, separator)
         # Names of gauges may be numbers too, but not most of them.
-        share = _numbers(cells[row]) if count == width else None
+        share = _numbers(cells) if count == width else None
         if share is not None and share[1] > 0.5:
             return header if width < header <= width + _MOST_REMARKS else width
-        if "".join(cells[row]) and not is_number(cells[row][0]):
+        if "".join(cells) and not is_number(cells[0]):
             header = count
     return width
 

@@ -103,8 +103,8 @@ def _labels(
     empty = np.array([text == "" for text in texts], bool)[index]
     # As merged cells do; where most rows have a label, an empty one was forgotten.
     if len(index) and not empty[0] and 2 * empty.sum() > len(index):
-        words = "stands in the first row of each: the rows below it count as"
-        notes.append(f"the label of {quoted(column.header)} {words} the same")
+        words = "stands in the first row of each: the rows below it count as the same"
+        notes.append(f"the label of {quoted(column.header)} {words}")
         last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(index))))
         index, empty = index[last], np.zeros(len(index), bool)
     optional = column.quantity in GROUPINGS
