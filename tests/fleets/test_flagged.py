@@ -21,8 +21,6 @@ def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
     rows.noise[0] *= np.exp(0.1 * odd.get("noise", 0.0))
     rows.loop[0] += 0.1 * odd.get("loop", 0.0)
     rows.bend[0] += 0.1 * odd.get("bend", 0.0)
-    rows.gain = np.zeros((gears, 2))
-    rows.gain[0, 1] = odd.get("other_part", 0.0)
     return fit_population(rows.readings(rng), Sampling(seed=seed))
 
 
@@ -53,10 +51,6 @@ def test_progress_reaches_its_end_without_a_loop():
     sampling = Sampling(progress=lambda done, every: steps.append(done / every))
     assert "loop" not in fit_population(readings, sampling).draws
     assert steps == sorted(steps) and steps[-1] == 1.0
-
-
-def test_a_mounting_of_another_part_shows_in_the_noise():
-    assert 0 in flagged(fitted(12, 3, other_part=0.1))["noise"]
 
 
 def test_a_gear_far_off_changes_no_other_gear():

@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from gear_records import records, refused
+from gear_rows import ordinary
 
 from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
-from hdcal.fleets.reading.record_faults import irregular
+from hdcal.fleets.reading.record_faults import faults_among_gears, irregular
 
 ODD = "G3"
 
@@ -145,6 +146,37 @@ def test_fewer_than_three_that_are_left_are_refused():
     frame.loc[frame["gear"] == "G2", "force_N"] *= -1.0
     words = refused(usable, read_fleet(frame), skip_bad=True)
     assert "of 4 gears 2 can be used" in words[-1] and len(words) == 3
+
+
+@pytest.mark.parametrize(
+    ("gears", "scatter", "apart", "found"),
+    [
+        (10, 0.0, 0.05, True),
+        (100, 0.003, 0.1, True),
+        (10, 0.003, 0.0, False),
+        (100, 0.003, 0.0, False),
+        (10, 0.0, 0.005, False),
+    ],
+)
+def test_two_parts_under_one_label(gears, scatter, apart, found):
+    hits = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        rows = ordinary(gears, rng)
+        gain = scatter * rng.standard_normal((gears, 2))
+        gain[2, 1] += apart
+        rows.gain, rows.noise = gain, rows.noise / 3.0
+        bad = faults_among_gears(rows.readings(rng))
+        hits += [*bad] == ["G2"] if found else not bad
+    assert hits >= 19
+
+
+def test_gains_of_rigs_are_no_two_parts():
+    rng = np.random.default_rng(5)
+    rows = ordinary(12, rng)
+    rows.gain = np.tile([0.0, 0.3], (12, 1))
+    rows.labels = {"rigs": ["A", "B"] * 12}
+    assert not faults_among_gears(rows.readings(rng))
 
 
 def test_regular_records_fail_as_rarely_as_stated():

@@ -1,14 +1,15 @@
 """Faults in the records of gears, found by comparison with the other gears.
 
 Screening finds jumps, drops and saturation in a record. Comparison finds a record that
-follows no curve, and one in another unit. A gear with a fault is left out whole, since
-a fault is no scatter between gears.
+follows no curve, one in another unit, and two parts under one label. A gear with a
+fault is left out whole, since a fault is no scatter between gears.
 """
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.stats import norm, t
 
 from hdcal.errors import Finding
@@ -16,6 +17,7 @@ from hdcal.fleets.model.groups import robust_sd
 from hdcal.fleets.model.line_fits import fit_terms
 from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums
 from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.screening.result import MACHINE_CLASS
 from hdcal.screening.wild import FEWEST
 
 # Share of squares that rounding leaves of a deformation that stays, and of residuals.
@@ -29,6 +31,11 @@ _FLAT = 1e-9
 # The residuals of a record without a curve: in those of the usual gear, as a share of
 # the range of its force, and the correlation of neighbours in its standard error.
 _TIMES, _SHARE, _ALIKE = 5.0, 0.01, 3.0
+# Probability that one of all gears without a fault is taken for two parts, degrees of
+# freedom of the tails of their scatter, and a difference that the rig may make.
+_TWO_PARTS, _TAILS, _SAME = 1e-3, 8.0, 2.0 * MACHINE_CLASS
+# Correlation of neighbours that is taken into account at most.
+_MOST_ALIKE = 0.99
 # Probability of each of two tests that a regular record fails it.
 _IRREGULAR = 2e-3
 
@@ -100,7 +107,7 @@ def faults_among_gears(readings: FleetReadings) -> dict[str, Finding]:
     case, sums = readings.case, readings.sums
     bad: dict[int, Finding] = {}
     # Each test is of the gears that passed the one before.
-    for test in (_no_slope, _no_curve):
+    for test in (_no_slope, _no_curve, _two_parts):
         if len(sums.gear):
             for gear, problem in test(readings, sums):
                 bad.setdefault(int(gear), Finding(case.name, problem, _REMEDY))
@@ -148,3 +155,55 @@ def _no_curve(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
             f"those of the other gears by {usual:.2g} {unit}. A break, a channel that "
             "stood still, or two parts under one label",
         )
+
+
+def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
+    """Yield gears whose mountings on one rig differ far more than those of other gears.
+
+    The scatter of mountings is a robust estimate from n differences, in addition to
+    their errors. The median of n has the tails of (n + 1)/2 degrees of freedom.
+    """
+    case = readings.case
+    table = _log_stiffness(sums.where(sums.products[:, 0, 0] > 0.0))
+    rig = np.array(case.rigs)[table["run"]] if case.rigs else 0
+    table = table.assign(rig=rig).sort_values("place")
+    table["count"] = table.groupby(["gear", "rig"])["place"].transform("size")
+    table = table[table["count"] > 1]
+    if table.empty:
+        return
+    ends = table.groupby(["gear", "rig"])
+    low, high, many = ends.first(), ends.last(), ends.size().to_numpy()
+    # Bessel's correction of the deviations from the mean of a gear.
+    off = table["place"] - ends["place"].transform("mean")
+    off *= np.sqrt(table["count"] / (table["count"] - 1.0))
+    own = robust_sd(off.to_numpy()) ** 2 - float(table["variance"].median())
+    variance = low["variance"] + high["variance"] + 2.0 * max(own, 0.0)
+    gap, scatter = (high["place"] - low["place"]).to_numpy(), np.sqrt(variance)
+    chances, free = float(np.sum(many * (many - 1.0))), float(np.sum(many - 1.0))
+    limit = t.isf(_TWO_PARTS / chances, min((free + 1.0) / 2.0, _TAILS)) * scatter
+    usual = 100.0 * float(np.median(scatter))
+    for index in np.flatnonzero(gap > np.maximum(limit, _SAME)):
+        softer, stiffer = (
+            case.run_labels[end["run"].iloc[index]] for end in (low, high)
+        )
+        yield (
+            low.index[index][0],
+            f"mounting {stiffer} is {100.0 * np.expm1(gap[index]):.2g} % stiffer than "
+            f"{softer}, and mountings of other gears differ by {usual:.2g} % (sd): two "
+            "parts under one label",
+        )
+
+
+def _log_stiffness(sums: MountingSums) -> pd.DataFrame:
+    """Return the logarithm of the stiffness of mountings, and its variance.
+
+    Loop and bend of the usual mounting are taken out.
+    """
+    fits, square = curve_fits(sums), sums.products[:, 0, 0]
+    loop, bend = np.median(fits.residual[:, 1:3], axis=0)
+    pull = sums.products[:, 0] @ np.array([0.0, loop, bend, 1.0])
+    pull = np.maximum(pull, np.finfo(float).tiny)
+    alike = np.clip(np.median(fits.alike), 0.0, _MOST_ALIKE)
+    noise = np.maximum(fits.sd, np.median(fits.sd)) ** 2 * (1 + alike) / (1 - alike)
+    columns = {"place": np.log(pull / square), "variance": noise * square / pull**2}
+    return pd.DataFrame({"gear": sums.gear, "run": sums.run} | columns)
