@@ -12,7 +12,7 @@ from schema_checks import obeys
 from hdcal.design.inverse_design import InverseDesign, inverse_design
 from hdcal.design.nearest_point import nearest_kept
 from hdcal.errors import InputError
-from hdcal.physics.profile import peak_stress
+from hdcal.physics.theory import peak_stress
 from hdcal.report.charts.chart_spec import Rule
 
 WALL, RADIUS = {"wall_thickness_mm": (0.4, 0.9)}, {"radius_mm": (32.0, 50.0)}

@@ -210,7 +210,7 @@ def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -
     errors = errors - (errors @ half.T) @ half
     errors = errors / np.linalg.norm(errors, axis=1, keepdims=True)
     inside = [
-        np.log(np.sum((errors @ white(kernel).T) ** 2, axis=1) + 1e-300)
+        np.log(np.sum((errors @ white(kernel.columns).T) ** 2, axis=1) + 1e-300)
         for kernel in searched.kernels
     ]
     table = np.stack(inside, axis=1)

@@ -81,7 +81,7 @@ def diagnose(
         how_far=_how_far(case, searched, fit, names, rng),
         next_test=tuple(
             run.model_copy(update={"run": case.units.say(run.run)})
-            for run in rank_runs(searched, posterior, rng)
+            for run in rank_runs(searched, posterior)
         ),
         refits=tuple(Refit(hypothesis=n, probability=p) for n, (p, _) in ranked),
         left_out=fits.left_out,

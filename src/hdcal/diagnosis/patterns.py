@@ -17,8 +17,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.base_model import moments
-from hdcal.evidence.effect_curves import padded_records
-from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.linear_problem import LinearProblem, padded_records
 from hdcal.exported import jit
 from hdcal.inference.force_model.noise_form import loop_cells
 from hdcal.inference.force_model.residual_shapes import (

@@ -57,13 +57,9 @@ class Selection:
         extra: Sequence[Space] = (),
         only: set[int] | None = None,
     ) -> "Evaluated":
-        """Evaluate every item.
+        """Evaluate every item, or those of some components.
 
-        Args:
-            noise: model of the noise.
-            context: what the base contains besides.
-            extra: further narrow spaces of the remainder, that depend on the context.
-            only: the components that are wanted; by default all.
+        `extra` are further narrow spaces of the remainder, that depend on the context.
         """
         projection = Projection(self.problem, noise, context)
         atoms, wide, narrow = self._whitened(projection)
@@ -238,12 +234,8 @@ def select(
 ) -> Selection:
     """Return the most probable atoms of each effect, with the weight of all of them.
 
-    Args:
-        problem: the case.
-        noises: models of the noise over which atoms are compared.
-        effects: of the library.
-        kernels: of the remainder.
-        names: of all components, the remainder last.
+    Atoms are compared over all models of the noise. `names` are those of all
+    components, the remainder last.
     """
     atoms, spaces = effects.atoms, (*effects.spaces, *kernels)
     if not len(atoms.owner):

@@ -29,12 +29,8 @@ def play(
 ) -> Float[Array, " n"]:
     """Return what follows a deformation with play: it moves only when pushed.
 
-    y_i = max(x_i − r, min(x_i + r, y_(i−1))), y = 0 before the first row.
-
-    Args:
-        deformation: x [mm], in the order in which it was passed through.
-        half_width: r [mm].
-        restart: rows before which y is zero again.
+    y_i = max(x_i − r, min(x_i + r, y_(i−1))) with the half-width r [mm]; y = 0 before
+    the first row and before those that restart it.
     """
 
     def advance(last, row):
@@ -66,13 +62,7 @@ def fading(
 
     The signal is taken as linear in time between rows, for which the step is exact:
     y ← y e^(−λΔt) + Δs (1 − e^(−λΔt))/(λΔt). Before its first row a run has climbed
-    from zero since the reset at t = 0.
-
-    Args:
-        signal: in any unit.
-        time: since the reset of the row's run [s].
-        run: index of the mounting.
-        rate: λ, one over the time constant [1/s].
+    from zero since the reset at t = 0. The rate λ is one over the time constant [1/s].
     """
     order, starts = by_label(run)
     time, signal = jnp.asarray(time)[order], jnp.asarray(signal)[order]
@@ -92,12 +82,8 @@ def stop_cells(
 ) -> Float[Array, "c n"]:
     """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
 
-    Every run starts from rest: its first row is a move from ω = 0.
-
-    Args:
-        deformation: ω in the order it was taken [mm].
-        run: index of the mounting.
-        reach: deformation from rest to slip, cell by cell [mm].
+    Every run starts from rest: its first row is a move from ω = 0. The reach is the
+    deformation from rest to slip of each cell [mm].
     """
     order, starts = by_label(run)
     own = jnp.asarray(deformation)[order]
@@ -118,13 +104,9 @@ def load_cycle(
 ) -> Float[Array, " n"]:
     """Return the number of the load cycle that each specimen is in, from 1.
 
-    A cycle begins with each run, and within it wherever the movement turns back to
-    the sense in which the run began. Rows count in the order of the file.
-
-    Args:
-        sense: sign of the last movement.
-        run: index of the mounting; a run belongs to one specimen.
-        specimen: index of the gear.
+    A cycle begins with each run, and within it wherever the movement turns back to the
+    sense in which the run began. Rows count in the order of the file; a run belongs to
+    one specimen.
     """
     order, starts = by_label(run)
     own = jnp.asarray(sense)[order]

@@ -92,11 +92,8 @@ def linear_response(
 ) -> Float[Array, "n 2"]:
     """Return deformation [mm] and speed [mm/s] at the rows.
 
-    Args:
-        gear: mass, damping and stiffness.
-        time: increasing, in steps of any size [s].
-        force: at the rows [N], linear between them.
-        start: deformation and speed at the first row.
+    Times [s] increase in steps of any size, the force [N] is linear between the rows,
+    and `start` is deformation and speed at the first row.
     """
 
     # A gradient recomputes each step, which takes less memory than to keep it.

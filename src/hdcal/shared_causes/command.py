@@ -21,19 +21,12 @@ from hdcal.cli.options import (
 @click.option(
     "--jobs", default=1, show_default=True, help="Processes to share the gears."
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Dask scheduler whose workers share the gears instead.",
-)
 @skip_bad_option
 @seed_option
 @folder_options("Result folder [default: NAME-causes].")
 @json_option
 @click.pass_obj
-def causes(
-    console: Console, out, force, seed, library, jobs, scheduler, skip_bad, **given
-):
+def causes(console: Console, out, force, seed, library, jobs, skip_bad, **given):
     """Find which effects the gears in DATA have, and how frequent each effect is.
 
     DATA names the gear of each row in a column `specimen`, also called gear or serial;
@@ -62,7 +55,7 @@ def causes(
     assert case is not None and effects is not None
     from hdcal.shared_causes.causes import causes as shared_causes
 
-    asked = {"jobs": jobs, "scheduler": scheduler, "skip_bad": skip_bad, "seed": seed}
+    asked = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed}
     with progress_bar("weighing") as progress:
         found = shared_causes(case, library=effects, progress=progress, **asked)
     return console.show(found, tables={"gears.csv": found.to_frame()})
