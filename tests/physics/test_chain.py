@@ -1,6 +1,5 @@
 """The chain, written for whole records, is the obvious sum row by row."""
 
-import dataclasses
 import math
 
 import jax
@@ -111,21 +110,6 @@ def test_stages_not_their_listing_decide_the_order(scattered, base, reading):
     again, noise_again = compiled(base, moved, records, reading)
     np.testing.assert_allclose(again, mean, rtol=1e-13, atol=1e-12)
     np.testing.assert_array_equal(noise_again.sd, noise.sd)
-
-
-def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, loading):
-    """Away from the corner the stated formulas hold: max(0, ω − ω_c) and |ω|."""
-    deformation = np.linspace(3.0 * SLACK, 0.54, 180)
-    records = dataclasses.replace(loading, deformation=deformation)
-    base = dataclasses.replace(base, deformation_offset=0.0, alpha=0.0)
-
-    def mean(*effects):
-        return predict_reading(base, effects, records, reading)[0] - base.force_offset
-
-    sharp = base.stiffness * (deformation - SLACK)
-    np.testing.assert_allclose(mean(SeatingSlack(SLACK)), sharp, rtol=1e-5)
-    sharp = base.stiffness * deformation * (1.0 + GAIN * deformation)
-    np.testing.assert_allclose(mean(ProgressiveStiffening(GAIN)), sharp, rtol=5e-5)
 
 
 @pytest.mark.parametrize("per_read", [1.0, 0.5])

@@ -11,7 +11,7 @@ from hdcal.physics.effect import Rows
 from hdcal.physics.effects.loops import CoulombFriction, Hysteresis
 from hdcal.physics.effects.stiffness import StiffnessFatigue
 from hdcal.physics.effects.time import ChargeLeakage, Relaxation
-from hdcal.physics.history import load_cycle, play, stop_cells
+from hdcal.physics.history import load_cycle, stop_cells
 
 MIXED = np.arange(24).reshape(3, 8).T.ravel()
 
@@ -159,25 +159,3 @@ def test_leakage_obeys_its_differential_equation(scattered, rate):
     relaxed = Relaxation(0.04, 1.0 / rate).apply(np.zeros(24), rows)
     left = slow_leak(rate, records, load)
     np.testing.assert_allclose(relaxed, -0.04 * (load - left), rtol=1e-7, atol=1e-7)
-
-
-def slow_play(deformation, half_width, restart):
-    found, at = [], 0.0
-    for pushed, anew in zip(deformation, restart, strict=True):
-        at = 0.0 if anew else at
-        if pushed - at > half_width:
-            at = pushed - half_width
-        elif at - pushed > half_width:
-            at = pushed + half_width
-        found.append(at)
-    return np.array(found)
-
-
-@pytest.mark.parametrize("rows", [1, 256])
-def test_play(rows):
-    rng = np.random.default_rng(rows)
-    deformation = np.cumsum(rng.normal(0.0, 0.2, rows))
-    restart = rng.uniform(size=rows) < 0.05
-    found = jax.jit(play)(deformation, 0.3, restart)
-    slow = slow_play(deformation, 0.3, restart)
-    np.testing.assert_allclose(found, slow, rtol=1e-13, atol=1e-13)

@@ -64,12 +64,7 @@ class Candidate(NamedTuple):
 def candidate_runs(
     records: Records, reference_temperature: float
 ) -> Iterator[Candidate]:
-    """Yield runs that show what the measured ones cannot.
-
-    Args:
-        records: what was measured, run after run.
-        reference_temperature: T_ref of the gear [°C].
-    """
+    """Yield runs that show what the measured ones cannot, given T_ref [°C]."""
     known, paths, pace = records.known, _paths(records), _pace(records)
     warmth = np.asarray(records.temperature)
     first, last = float(warmth[0]), float(warmth[-1])

@@ -193,12 +193,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
 
 
 def find_patterns(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
-    """Return the contrasts that noise would rarely show, the clearest first.
-
-    Args:
-        problem: rows and base model.
-        case: for labels and the correlation of its noise.
-    """
+    """Return the contrasts that noise would rarely show, the clearest first."""
     records = problem.records
     # Of a gear that is pulled the statements are about the size of its force.
     side = loading_side(np.asarray(records.deformation))

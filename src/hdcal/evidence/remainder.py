@@ -2,7 +2,7 @@
 
 A kernel is a space: smooth functions of one covariate, labels, products of two of them,
 or a Matérn-½ process over the order of the rows. Local structure is one stretch of rows
-or one period: each family of directions enters with its likeliest member, whose prior
+or one period: of each family of directions the likeliest member enters, and its prior
 is divided by the size of the family.
 """
 

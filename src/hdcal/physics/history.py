@@ -7,41 +7,6 @@ from jaxtyping import Bool, Float, Int
 from hdcal.data.records import Array
 
 
-def leaky_sum(
-    decay: Float[Array, " n"], gain: Float[Array, " n"]
-) -> Float[Array, " n"]:
-    """Return y_i = decay_i · y_(i−1) + gain_i with y before the first row zero.
-
-    A decay of zero restarts the sum.
-    """
-
-    def advance(last, row):
-        now = row[0] * last + row[1]
-        return now, now
-
-    return jax.lax.scan(advance, jnp.zeros(()), (decay, gain))[1]
-
-
-def play(
-    deformation: Float[Array, " n"],
-    half_width: Float[Array, ""] | float,
-    restart: Bool[Array, " n"],
-) -> Float[Array, " n"]:
-    """Return what follows a deformation with play: it moves only when pushed.
-
-    y_i = max(x_i − r, min(x_i + r, y_(i−1))) with the half-width r [mm]; y = 0 before
-    the first row and before those that restart it.
-    """
-
-    def advance(last, row):
-        pushed, anew = row
-        last = jnp.where(anew, 0.0, last)
-        now = jnp.maximum(pushed - half_width, jnp.minimum(pushed + half_width, last))
-        return now, now
-
-    return jax.lax.scan(advance, jnp.zeros(()), (deformation, restart))[1]
-
-
 def by_label(label: Int[Array, " n"]) -> tuple[Int[Array, " n"], Bool[Array, " n"]]:
     """Return the rows label after label, and which of those start a label.
 
@@ -74,7 +39,13 @@ def fading(
     safe = jnp.where(small, 1.0, loss)
     kept = jnp.where(small, 1.0 - 0.5 * loss, -jnp.expm1(-safe) / safe)
     decay = jnp.where(starts, 0.0, jnp.exp(-loss))
-    return jnp.zeros_like(signal).at[order].set(leaky_sum(decay, gain * kept))
+
+    def advance(last, row):
+        now = row[0] * last + row[1]
+        return now, now
+
+    found = jax.lax.scan(advance, jnp.zeros(()), (decay, gain * kept))[1]
+    return jnp.zeros_like(signal).at[order].set(found)
 
 
 def stop_cells(

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.physics.effect import Effect, PerRow, Rows, parameter
-from hdcal.physics.history import by_label, play, stop_cells
+from hdcal.physics.history import stop_cells
 from hdcal.physics.theory import Scalar
 
 
@@ -28,10 +28,9 @@ class PlasticYield(Effect, stage="force", family="loop", needs=("unloading",)):
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
         # Specimen after specimen, each from its first row, whatever the run.
-        order, starts = by_label(rows.records.specimen)
-        deformation = jnp.asarray(rows.deformation)[order]
-        plastic = play(deformation, self.yield_deformation, starts)
-        plastic = jnp.zeros_like(signal).at[order].set(plastic)
+        reach = jnp.reshape(self.yield_deformation, (1,))
+        (elastic,) = stop_cells(rows.deformation, rows.records.specimen, reach)
+        plastic = rows.deformation - self.yield_deformation * elastic
         return signal - self.softening * rows.stiffness * plastic
 
 
