@@ -147,6 +147,9 @@ def test_yield_leaves_a_set(scattered):
     path = np.concatenate([np.linspace(0.0, 0.55, 12), np.linspace(0.55, 0.0, 12)])
     records = dataclasses.replace(scattered(0), specimen=np.zeros(24, int))
     force = yielded(path, records)
+    # Exactly elastic before: the curve of a gear that never yields has no direction.
+    inside = np.flatnonzero(path[:12] < effect.yield_deformation)
+    np.testing.assert_array_equal(force[inside], STIFFNESS * path[inside])
     beyond = np.flatnonzero(path[:12] > effect.yield_deformation)
     slope = np.diff(force[beyond]) / np.diff(path[beyond])
     np.testing.assert_allclose(slope, STIFFNESS * (1.0 - effect.softening), rtol=1e-9)

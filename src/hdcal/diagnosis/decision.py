@@ -40,7 +40,6 @@ class Decision:
         gap: probability that something acts.
         gap_N: rms of what acts on the mean reading, where it does [N]; None where no
             draws were made.
-        which: what acts, and which share of the gap's rms it explains.
         explanations: all that are possible, the most probable first.
         hypotheses: probability of each hypothesis on the mean reading and effect on
             the noise.

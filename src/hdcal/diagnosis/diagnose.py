@@ -52,7 +52,7 @@ def diagnose(
         library: effects to consider, by name; by default all of them.
         quick: without calibrating the models that are left.
         seed: of all random numbers.
-        progress: called with (iterations done, iterations in all) while sampling.
+        progress: called with the iterations done and all of them while sampling.
 
     Raises:
         InputError: library or seed is invalid, an effect has no prior, the force does

@@ -91,15 +91,13 @@ def candidate_runs(
     elif abs(first - last) > _SAME:
         words = f"go back to the first temperature, {first:.0f} °C, and load again"
         yield run(words, "one change of temperature", 6.0, loop, temperature=first)
-    depth = np.abs(records.deformation)
-    if np.sum(depth < np.quantile(np.abs(paths["fine"]), 0.5)) < _ROWS // 2:
-        words = "re-seat the gear and load again in finer steps at small "
-        yield run(words + "{displacement}s", mounting, 2.0, paths["fine"])
+    words = "re-seat the gear and load again in finer steps at small {displacement}s"
+    yield run(words, mounting, 2.0, paths["fine"])
     words = "small loops between half and 0.7 of the top"
     yield run(words, one, 1.5, paths["inner"])
     words = "load to 1.25 of the tested {displacement}"
     yield run(words, "one run beyond the tested range", 5.0, paths["beyond"])
-    if np.ptp(records.angle) == 0.0:
+    if np.ptp(records.angle) < np.pi / 2.0:
         angle = float(records.angle[-1]) + np.pi / 2.0
         words = "turn the gear by 90° and load again"
         yield run(words, mounting, 2.0, paths["up"], angle=angle)

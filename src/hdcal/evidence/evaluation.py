@@ -31,7 +31,6 @@ class Selection:
     """Atoms and spaces that are compared given every context.
 
     Attributes:
-        problem: the case.
         atoms: the most probable ones, with the weight of all.
         tolerance: columns of their shapes' tolerance at a relative sd of 1, (m, l, n).
         spaces: effects with several columns, and kernels; wide ones first.
@@ -129,7 +128,6 @@ class Evaluated:
     """Evidence of all items given one context.
 
     Attributes:
-        selection: the items.
         none: log evidence of the context alone.
         atoms: those with an amplitude.
         spaces: log evidence of the others at each scale, `extra` last.

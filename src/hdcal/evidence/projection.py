@@ -56,8 +56,6 @@ class Projection:
     """The base and a context under one model of the noise.
 
     Attributes:
-        problem: the case.
-        noise: model of the noise.
         square: square of the whitened readings with the base projected out.
         constant: part of every log evidence: priors and volume of the whitening.
     """

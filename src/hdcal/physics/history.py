@@ -48,26 +48,40 @@ def fading(
     return jnp.zeros_like(signal).at[order].set(found)
 
 
+def play(
+    deformation: Float[Array, " n"],
+    label: Int[Array, " n"],
+    half_width: Float[Array, " c"],
+) -> Float[Array, "c n"]:
+    """Return what follows a deformation with play: it moves only when pushed.
+
+    y ← max(ω − r, min(ω + r, y)) for each half-width r [mm]. Each run, or specimen,
+    starts from y = 0.
+    """
+    order, starts = by_label(label)
+
+    def advance(last, row):
+        pushed, anew = row
+        last = jnp.where(anew, 0.0, last)
+        now = jnp.maximum(pushed - half_width, jnp.minimum(pushed + half_width, last))
+        return now, now
+
+    rows = (jnp.asarray(deformation)[order], starts)
+    found = jax.lax.scan(advance, jnp.zeros_like(half_width), rows)[1].T
+    return jnp.zeros_like(found).at[:, order].set(found)
+
+
 def stop_cells(
-    deformation: Float[Array, " n"], run: Int[Array, " n"], reach: Float[Array, " c"]
+    deformation: Float[Array, " n"],
+    label: Int[Array, " n"],
+    reach: Float[Array, " c"],
 ) -> Float[Array, "c n"]:
     """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
 
-    Every run starts from rest: its first row is a move from ω = 0. The reach is the
-    deformation from rest to slip of each cell [mm].
+    What a play of this half-width leaves of the deformation. Each run, or specimen,
+    starts from rest: its first row is a move from ω = 0.
     """
-    order, starts = by_label(run)
-    own = jnp.asarray(deformation)[order]
-    move = jnp.where(starts, own, jnp.diff(own, prepend=0.0))
-
-    def advance(last, row):
-        kept, step = row
-        now = jnp.clip(kept * last + step / reach, -1.0, 1.0)
-        return now, now
-
-    rows = (jnp.where(starts, 0.0, 1.0), move)
-    states = jax.lax.scan(advance, jnp.zeros_like(reach), rows)[1].T
-    return jnp.zeros_like(states).at[:, order].set(states)
+    return (deformation - play(deformation, label, reach)) / reach[:, None]
 
 
 def load_cycle(
