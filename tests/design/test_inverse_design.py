@@ -12,7 +12,7 @@ from schema_checks import obeys
 from hdcal.design.gears import calibrated_gears
 from hdcal.design.inverse_design import InverseDesign, inverse_design
 from hdcal.errors import InputError
-from hdcal.physics.profile import peak_stress
+from hdcal.physics.theory import peak_stress
 from hdcal.report.charts.chart_spec import Rule
 
 WALL, RADIUS = {"wall_thickness_mm": (0.4, 0.9)}, {"radius_mm": (32.0, 50.0)}

@@ -104,8 +104,7 @@ def test_suggested_runs_separate_hypotheses():
     """A ramp does not separate stiffening from other bends."""
     case = simulated(ramp(60), {"progressive_stiffening": {"slope": 0.4}}, seed=1)
     searched = search(case, EFFECTS)
-    rng = np.random.default_rng(0)
-    runs = rank_runs(searched, searched.table.posterior(TEMPERATURE), rng)
+    runs = rank_runs(searched, searched.table.posterior(TEMPERATURE))
     assert runs and all(run.information_nats >= 0.02 for run in runs)
     assert all(one != two for one, two in (run.separates for run in runs))
 

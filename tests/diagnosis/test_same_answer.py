@@ -60,9 +60,7 @@ def written(
 
 
 CHANGES = {
-    "a thousand times the force": {"force": 1000.0},
     "stiffer and smaller": {"force": 37.0, "deformation": 0.21},
-    "pulled": {"force": -1.0, "deformation": -1.0},
     "six digits": {"number": "%.6g"},
     "kN, µm and minutes": {"units": ("um", "kN", "min"), "sizes": (1e-3, 1e3, 60.0)},
 }

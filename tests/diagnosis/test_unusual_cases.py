@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import NOISE, rich, simulated
-from rigs import cycles, make_case, make_gear, make_records, ramp
+from rigs import make_case, make_gear, make_records, ramp
 from schema_checks import obeys
 
 from hdcal.data.case import Case
@@ -14,7 +14,6 @@ from hdcal.data.prior import Prior
 from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.result import Diagnosis
 from hdcal.errors import InputError
-from hdcal.evidence.row_features import average_rows, half_cycles
 from hdcal.physics.effect import Effect, parameter
 from hdcal.physics.registry import EFFECTS
 
@@ -102,53 +101,6 @@ def test_zeros_of_many_short_runs(sd: float):
     assert found.which.inclusion["run_offset"] > 0.9
     assert found.how_far.closed is not None and found.how_far.closed.median > 0.5
     assert found.how_far.left_out == "a quarter of each run"
-
-
-def test_long_records_are_averaged_within_half_cycles():
-    records = cycles(600)
-    records = replace(records, force_sd=np.full(600, 0.3))
-    case = with_force(records, 195.0 * records.deformation)
-    short = average_rows(case, 210).records
-    # Groups of three; a half cycle ends with a smaller one.
-    halves = half_cycles(records)
-    assert len(short.force) == sum(-(-n // 3) for n in np.bincount(halves))
-    first = np.mean(np.asarray(case.records.force)[:3])
-    assert short.force[0] == pytest.approx(first)
-    assert short.force_sd[0] == pytest.approx(0.3 / np.sqrt(3.0))
-    assert short.force == pytest.approx(195.0 * np.asarray(short.deformation))
-    assert average_rows(case, 600) is case
-
-
-def loops_of_gears() -> Case:
-    """Return six gears, one of them softer, with the same loop in each."""
-    rng, gears, steps = np.random.default_rng(1), 6, 9
-    up = np.linspace(0.0, 0.6, steps)
-    path = np.concatenate([up, up[-2::-1]])
-    stuck, slip = 0.0, []
-    for step in np.diff(path, prepend=0.0):
-        stuck = np.clip(stuck + 22.0 * step, -1.5, 1.5)
-        slip.append(stuck)
-    stiffness = 100.0 * (1.0 + 0.015 * rng.normal(size=gears))
-    stiffness[3] *= 0.85
-    force = np.outer(stiffness, path) + slip
-    force += NOISE * rng.normal(size=force.shape)
-    gear = np.repeat(np.arange(gears), len(path))
-    sense = np.tile(np.repeat([1.0, -1.0], [steps, steps - 1]), gears)
-    known, columns = {"unloading", "specimens"}, {"specimen": gear, "run": gear}
-    path = np.tile(path, gears)
-    records = make_records(path, force.ravel(), known=known, sense=sense, **columns)
-    return make_case(records)
-
-
-def test_a_loop_and_the_scatter_of_gears_both_act():
-    loops = ("plastic_yield", "hysteresis")
-    names = (*loops, "specimen_variation", "coulomb_friction")
-    found = quick(loops_of_gears(), library={n: EFFECTS[n] for n in names})
-    members = {name for cause in found.which.acting for name in cause.members}
-    assert "specimen_variation" in members and members & {*loops}
-    assert found.how_far.closed is not None and found.how_far.closed.median > 0.9
-    run = found.next_test[0]
-    assert {*run.separates[0], *run.separates[1]} & {*loops}
 
 
 def test_an_effect_that_is_left_out_is_not_named_and_one_of_a_user_is():

@@ -53,11 +53,6 @@ def test_a_planted_effect_acts_and_probabilities_add_up(name: str):
     assert len(members) == len({*members})
 
 
-def test_a_plain_case_has_no_gap():
-    chances = [decide(simulated(rich(), seed=seed), EFFECTS).gap for seed in range(3)]
-    assert max(chances) < 0.5 and np.mean(chances) < 0.2
-
-
 @pytest.mark.parametrize("effects", [{}, HYSTERESIS])
 def test_wild_readings_are_outliers_with_or_without_structure(effects: dict):
     found = decide(with_wild_readings(simulated(rich(), effects, seed=2)), EFFECTS)
@@ -91,13 +86,10 @@ def test_loading_or_shape_separates_yield_from_saturation(softening, path, alike
     assert excluded != alike
 
 
-@pytest.mark.parametrize(
-    ("name", "size"), [("amplifier_drift", "rate"), ("coulomb_friction", "force")]
-)
-def test_a_withheld_effect_is_outside(name: str, size: str):
-    planted = {name: {size: 0.02 if size == "rate" else 2.0}}
-    library = {n: effect for n, effect in EFFECTS.items() if n != name}
-    found = decide(simulated(rich(), planted, seed=1), library)
+def test_a_withheld_effect_is_outside():
+    library = {n: effect for n, effect in EFFECTS.items() if n != "amplifier_drift"}
+    drift = {"amplifier_drift": {"rate": 0.02}}
+    found = decide(simulated(rich(), drift, seed=1), library)
     assert found.gap > 0.99 and found.explanations[0].outside
     assert not [each for each in found.which.causes if each.probability >= 0.9]
 

@@ -1,6 +1,7 @@
 """The one formula equals dense multivariate normal densities."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from hdcal.evidence.evaluation import Selection
 from hdcal.evidence.items import Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Context
+from hdcal.evidence.parts import Context, posterior
 from hdcal.evidence.projection import Projection
+from hdcal.evidence.table import OUTSIDE, EvidenceTable
 
 ROWS, NOISE, NAMES = 24, 0.4, ("one", "other", "outside")
 CLOSE = 1e-3
@@ -34,6 +36,12 @@ BEND = 2.0 * np.sin(6.0 * np.asarray(PROBLEM.records.deformation))
 COLUMNS = np.random.default_rng(1).normal(size=(3, ROWS))
 
 
+def serial_correlation(noise: NoiseModel) -> np.ndarray:
+    run = np.cumsum(PROBLEM.before < 0)
+    lag = np.abs(np.subtract.outer(np.arange(ROWS), np.arange(ROWS)))
+    return np.where(run[:, None] == run, noise.correlation**lag, 0.0)
+
+
 def dense(noise: NoiseModel, offset=0.0, columns=None, held=None) -> float:
     """Return the log evidence of a Gaussian model, the noise sd on a fine grid.
 
@@ -43,10 +51,7 @@ def dense(noise: NoiseModel, offset=0.0, columns=None, held=None) -> float:
         columns: of unit prior sd.
         held: columns whose prior sd grows with the noise, as that of the base.
     """
-    run = np.cumsum(PROBLEM.before < 0)
-    lag = np.abs(np.subtract.outer(np.arange(ROWS), np.arange(ROWS)))
-    serial = np.where(run[:, None] == run, noise.correlation**lag, 0.0)
-    sd = 1.0 / noise.weight
+    serial, sd = serial_correlation(noise), 1.0 / noise.weight
     base = PROBLEM.X if held is None else np.concatenate([PROBLEM.X, held.T], axis=1)
     unit = sd[:, None] * serial * sd + base @ base.T / NOISE**2
     loose = np.zeros((ROWS, ROWS)) if columns is None else columns.T @ columns
@@ -128,6 +133,31 @@ def test_space_beside_a_context(noise, fine):
     beside = dense(noise, 0.2 * BEND, 0.3 * COLUMNS, held=context.columns)
     assert found.none == pytest.approx(alone, abs=CLOSE)
     assert found.totals()[2] == pytest.approx(beside, abs=CLOSE)
+
+
+def test_the_posterior_of_the_base_is_that_of_linear_regression(noise):
+    found = posterior(PROBLEM, noise, [])
+    same = np.arange(ROWS)
+    lag = noise.correlation ** np.abs(np.subtract.outer(same, same))
+    run = np.cumsum(PROBLEM.before < 0)
+    sd = NOISE / noise.weight
+    precision = np.linalg.inv(
+        sd[:, None] * np.where(run[:, None] == run, lag, 0.0) * sd
+    )
+    X = PROBLEM.X
+    covariance = np.linalg.inv(X.T @ precision @ X + np.eye(X.shape[1]))
+    np.testing.assert_allclose(found.factor.T @ found.factor, covariance, rtol=1e-8)
+    mean = covariance @ X.T @ precision @ PROBLEM.y
+    np.testing.assert_allclose(found.mean, mean, rtol=1e-8, atol=1e-10)
+
+
+def test_prior_probabilities_of_all_hypotheses_add_up():
+    names = (*"abcde", OUTSIDE)
+    table = EvidenceTable(names, [])
+    keys = [key for size in range(3) for key in combinations(names[:-1], size)]
+    keys += [(*key, OUTSIDE) for key in keys]
+    total = sum(np.exp(table.log_prior(key)) for key in keys)
+    assert total == pytest.approx(1.0, abs=1e-12)
 
 
 def test_few_nodes_are_enough(noise, monkeypatch):

@@ -1,13 +1,11 @@
 """The chain, written for whole records, is the obvious sum row by row."""
 
-import dataclasses
 import math
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.flatten_util import ravel_pytree
 
 from hdcal.physics.chain import (
     Base,
@@ -86,10 +84,9 @@ def random_base(seed: int) -> Base:
 
 
 @pytest.mark.parametrize("per_read", [1.0, 0.5])
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("effects", [(), EFFECTS], ids=["bare", "all effects"])
-def test_row_by_row(scattered, effects, seed, per_read):
-    records, base = scattered(seed), random_base(seed)
+def test_row_by_row(scattered, effects, per_read):
+    records, base = scattered(0), random_base(0)
     reading = Reading(per_read, 23.0)
     mean, noise = compiled(base, effects, records, reading)
     slow = slow_reading(base, records, reading, effects=bool(effects))
@@ -115,36 +112,9 @@ def test_stages_not_their_listing_decide_the_order(scattered, base, reading):
     np.testing.assert_array_equal(noise_again.sd, noise.sd)
 
 
-def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, loading):
-    """Away from the corner the stated formulas hold: max(0, ω − ω_c) and |ω|."""
-    deformation = np.linspace(3.0 * SLACK, 0.54, 180)
-    records = dataclasses.replace(loading, deformation=deformation)
-    base = dataclasses.replace(base, deformation_offset=0.0, alpha=0.0)
-
-    def mean(*effects):
-        return predict_reading(base, effects, records, reading)[0] - base.force_offset
-
-    sharp = base.stiffness * (deformation - SLACK)
-    np.testing.assert_allclose(mean(SeatingSlack(SLACK)), sharp, rtol=1e-5)
-    sharp = base.stiffness * deformation * (1.0 + GAIN * deformation)
-    np.testing.assert_allclose(mean(ProgressiveStiffening(GAIN)), sharp, rtol=5e-5)
-
-
-def test_parameters_may_differ_from_row_to_row(scattered, reading):
-    records = scattered(5)
-    bases = [random_base(seed) for seed in range(24)]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bases)
-    mean, noise = predict_reading(stacked, (), records, reading)
-    for row, base in enumerate(bases):
-        alone = predict_reading(base, (), records, reading)
-        assert float(mean[row]) == pytest.approx(float(alone[0][row]), rel=1e-13)
-        assert float(noise.sd[0, row]) == float(alone[1].sd[0, row])
-
-
 @pytest.mark.parametrize("per_read", [1.0, 0.5])
-@pytest.mark.parametrize("seed", range(2))
-def test_the_linear_core_is_exact(scattered, seed, per_read):
-    records, base = scattered(seed + 10), random_base(seed + 10)
+def test_the_linear_core_is_exact(scattered, per_read):
+    records, base = scattered(10), random_base(10)
     reading = Reading(per_read, 31.0)
     columns = linear_columns(records, reading)
     mean = predict_reading(base, (), records, reading)[0]
@@ -158,39 +128,17 @@ def test_the_force_is_the_chain_without_effects(gear, scattered, reading, theory
     records = scattered(8)
     influence, modulus, alpha, zero, offset = 2.4, 205e3, 4e-4, 0.01, -2.0
     base = Base(influence * THEORIES[theory](gear, modulus), alpha, zero, offset, 1.0)
-    point = {
-        "geometry": gear,
-        "modulus": modulus,
-        "influence": influence,
-        "alpha": alpha,
-        "deformation_offset": zero,
-        "force_offset": offset,
-    }
-    rise = records.temperature - 20.0
-    given = {"deformation": records.deformation, "temperature_rise": rise}
-    found = force(**point, **given, theory=theory)
+    found = force(
+        gear,
+        modulus,
+        influence,
+        records.deformation,
+        theory=theory,
+        alpha=alpha,
+        temperature_rise=records.temperature - 20.0,
+        deformation_offset=zero,
+        force_offset=offset,
+    )
     mean = predict_reading(base, (), records, reading)[0]
     np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)
     assert found.dtype == jnp.float64
-
-
-@pytest.mark.parametrize("theory", sorted(THEORIES))
-def test_gradients_of_the_force(gear, differences, theory):
-    point = {
-        "geometry": gear,
-        "modulus": 207e3,
-        "influence": 2.5,
-        "deformation": 0.31,
-        "alpha": 3e-4,
-        "temperature_rise": 35.0,
-        "deformation_offset": 0.004,
-        "force_offset": 1.5,
-    }
-
-    def value(point):
-        return force(**point, theory=theory)
-
-    exact = ravel_pytree(jax.grad(value)(point))[0]
-    assert exact.shape == (12,)
-    slow = differences(value, point)
-    np.testing.assert_allclose(exact, slow, rtol=1e-7, atol=1e-8)

@@ -5,14 +5,13 @@ import dataclasses
 import jax
 import numpy as np
 import pytest
-from scipy import integrate, special
+from scipy import integrate
 
 from hdcal.physics.effect import Rows
 from hdcal.physics.effects.loops import CoulombFriction, Hysteresis
-from hdcal.physics.effects.scatter import scores
 from hdcal.physics.effects.stiffness import StiffnessFatigue
 from hdcal.physics.effects.time import ChargeLeakage, Relaxation
-from hdcal.physics.history import load_cycle, play, stop_cells
+from hdcal.physics.history import load_cycle, stop_cells
 
 MIXED = np.arange(24).reshape(3, 8).T.ravel()
 
@@ -45,10 +44,9 @@ def slow_cycle(sense, run, specimen):
     return np.array(found)
 
 
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("mixed", [False, True])
-def test_stop_cells(scattered, seed, mixed):
-    records, reach = scattered(seed), np.array([0.05, 0.3, 2.0])
+def test_stop_cells(scattered, mixed):
+    records, reach = scattered(0), np.array([0.05, 0.3, 2.0])
     order = MIXED if mixed else np.arange(24)
     deformation, run = records.deformation[order], records.run[order]
     found = jax.jit(stop_cells)(deformation, run, reach)
@@ -56,10 +54,9 @@ def test_stop_cells(scattered, seed, mixed):
     np.testing.assert_allclose(found, slow, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("mixed", [False, True])
-def test_load_cycles(scattered, seed, mixed):
-    records = scattered(seed)
+def test_load_cycles(scattered, mixed):
+    records = scattered(0)
     order = MIXED if mixed else np.arange(24)
     specimen = np.array([0, 1, 0])[records.run]
     if mixed:  # the runs of one gear never take turns
@@ -113,13 +110,6 @@ def test_a_loop_closes_gradually_where_friction_jumps(scattered):
     assert np.max(np.abs(np.diff(found[25:]))) < 2.0
 
 
-def test_scores_are_those_of_a_normal():
-    found = np.asarray(scores(np.arange(200)))
-    assert len(np.unique(found)) == 200
-    spread = np.sort(special.ndtr(found))
-    np.testing.assert_allclose(spread, (np.arange(200) + 0.5) / 200, atol=0.01)
-
-
 @jax.jit
 def compiled_leak(rate, force, rows):
     return ChargeLeakage(rate).apply(force, rows)
@@ -158,7 +148,8 @@ def slow_leak(rate, records, force):
 
 @pytest.mark.parametrize("rate", [1e-9, 1e-3, 3.0])
 def test_leakage_obeys_its_differential_equation(scattered, rate):
-    records = scattered(4)
+    """Rows of several runs may alternate in a file; the order within a run counts."""
+    records = jax.tree.map(lambda leaf: leaf[MIXED], scattered(4))
     force = records.force
     found, slow = leak(rate, records, force), slow_leak(rate, records, force)
     np.testing.assert_allclose(found, slow, rtol=1e-8, atol=1e-7)
@@ -168,47 +159,3 @@ def test_leakage_obeys_its_differential_equation(scattered, rate):
     relaxed = Relaxation(0.04, 1.0 / rate).apply(np.zeros(24), rows)
     left = slow_leak(rate, records, load)
     np.testing.assert_allclose(relaxed, -0.04 * (load - left), rtol=1e-7, atol=1e-7)
-
-
-def test_leakage_of_a_held_force(scattered):
-    # Documented: at a time constant of 1000 s, 112 N held for 60 s read 6.5 N low.
-    hold = jax.tree.map(lambda leaf: leaf[:2], scattered(4))
-    hold = dataclasses.replace(hold, time=np.array([0.0, 60.0]))
-    shown = leak(1e-3, hold, np.array([112.0, 112.0]))
-    assert shown[0] == 112.0
-    assert 112.0 - shown[1] == pytest.approx(6.5, abs=0.05)
-
-
-def test_runs_may_be_interleaved(scattered):
-    # Rows of several runs may alternate in a file; the order within a run counts.
-    records = scattered(7)
-    mixed = np.arange(24).reshape(3, 8).T.ravel()
-    shuffled = jax.tree.map(lambda leaf: leaf[mixed], records)
-    np.testing.assert_allclose(
-        leak(0.02, shuffled, shuffled.force),
-        leak(0.02, records, records.force)[mixed],
-        rtol=1e-12,
-        atol=1e-12,
-    )
-
-
-def slow_play(deformation, half_width, restart):
-    found, at = [], 0.0
-    for pushed, anew in zip(deformation, restart, strict=True):
-        at = 0.0 if anew else at
-        if pushed - at > half_width:
-            at = pushed - half_width
-        elif at - pushed > half_width:
-            at = pushed + half_width
-        found.append(at)
-    return np.array(found)
-
-
-@pytest.mark.parametrize("rows", [1, 2, 17, 256])
-def test_play(rows):
-    rng = np.random.default_rng(rows)
-    deformation = np.cumsum(rng.normal(0.0, 0.2, rows))
-    restart = rng.uniform(size=rows) < 0.05
-    found = jax.jit(play)(deformation, 0.3, restart)
-    slow = slow_play(deformation, 0.3, restart)
-    np.testing.assert_allclose(found, slow, rtol=1e-13, atol=1e-13)

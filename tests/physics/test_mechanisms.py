@@ -78,16 +78,6 @@ def test_thermal_stiffness_is_another_alpha(scattered, base, reading):
     )
 
 
-def test_the_gauges_error_of_linearity():
-    # Documented: the distance from the line through the ends is e₁/4 times full scale².
-    effect, full = typical("displacement_nonlinearity"), 0.54
-    read = np.linspace(0.0, full, 1001)
-    seen = np.asarray(effect.apply(read, rows_of(read)))
-    line = read * seen[-1] / full
-    worst = np.max(np.abs(seen - line))
-    assert worst == pytest.approx(effect.curvature * full**2 / 4.0, rel=1e-6)
-
-
 def test_the_screw_repeats_each_turn():
     effect = typical("screw_error")
     read = np.linspace(-0.5, 0.5, 400)
@@ -96,9 +86,6 @@ def test_the_screw_repeats_each_turn():
     phase = np.arctan2(effect.cosine, effect.sine)
     expected = size * np.sin(2.0 * np.pi * read / effect.pitch + phase)
     np.testing.assert_allclose(error, expected, rtol=1e-9, atol=1e-15)
-    later = read + effect.pitch
-    again = np.asarray(effect.apply(later, rows_of(later))) - later
-    np.testing.assert_allclose(again, error, rtol=1e-9, atol=1e-14)
 
 
 def test_the_second_contact_has_its_own_slope():
@@ -130,15 +117,14 @@ def flattened_ring(load: float) -> float:
     def end(curvature):
         quarter = (0.0, 0.5 * np.pi)
         start = [0.0, curvature, 0.0]
-        return integrate.solve_ivp(bend, quarter, start, rtol=1e-11, atol=1e-12).y[
-            :, -1
-        ]
+        exact = {"rtol": 1e-11, "atol": 1e-12}
+        return integrate.solve_ivp(bend, quarter, start, **exact).y[:, -1]
 
     found = optimize.brentq(lambda k: end(k)[0] - 0.5 * np.pi, -3.0, 5.0, xtol=1e-13)
     return 1.0 - end(found)[2]
 
 
-@pytest.mark.parametrize("load", [-0.25, -0.1, 0.05, 0.1, 0.25])
+@pytest.mark.parametrize("load", [-0.25, 0.05, 0.25])
 def test_a_large_deflection_is_the_elasticas(load):
     relative = flattened_ring(load)
     effect, radius = typical("large_deflection"), 40.0
@@ -161,6 +147,9 @@ def test_yield_leaves_a_set(scattered):
     path = np.concatenate([np.linspace(0.0, 0.55, 12), np.linspace(0.55, 0.0, 12)])
     records = dataclasses.replace(scattered(0), specimen=np.zeros(24, int))
     force = yielded(path, records)
+    # Exactly elastic before: the curve of a gear that never yields has no direction.
+    inside = np.flatnonzero(path[:12] < effect.yield_deformation)
+    np.testing.assert_array_equal(force[inside], STIFFNESS * path[inside])
     beyond = np.flatnonzero(path[:12] > effect.yield_deformation)
     slope = np.diff(force[beyond]) / np.diff(path[beyond])
     np.testing.assert_allclose(slope, STIFFNESS * (1.0 - effect.softening), rtol=1e-9)
@@ -184,17 +173,3 @@ def test_the_set_outlives_the_run_but_not_the_specimen(scattered):
     turns = np.arange(16).reshape(2, 8).T.ravel()
     mixed = jax.tree.map(lambda leaf: leaf[turns], records)
     np.testing.assert_allclose(yielded(path[turns], mixed), fresh[turns], rtol=1e-12)
-
-
-def test_ovality_has_the_mean_of_a_turn(scattered):
-    effect = typical("ovality")
-    angle = np.arange(24) * np.pi / 12.0
-    records = dataclasses.replace(scattered(0), angle=angle)
-    force = force_on(effect, np.full(24, 0.4), records)
-    assert force.mean() == pytest.approx(STIFFNESS * 0.4, rel=1e-12)
-    expected = np.ones(24)
-    for times in (1, 2):
-        cos, sin = getattr(effect, f"cos_{times}"), getattr(effect, f"sin_{times}")
-        phase = np.arctan2(sin, cos) / times
-        expected += np.hypot(cos, sin) * np.cos(times * (angle - phase))
-    np.testing.assert_allclose(force, STIFFNESS * 0.4 * expected, rtol=1e-12)

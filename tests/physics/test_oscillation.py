@@ -17,7 +17,7 @@ XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
 MASS, STIFFNESS, FORCE = 4e-5, 200.0, 80.0
 PACE = np.sqrt(STIFFNESS / MASS)
 TIMES = np.linspace(0.0, 0.05, 401)
-RATIOS = [0.0, 0.3, 1.0, 2.5]
+RATIOS = [0.0, 1.0, 2.5]
 
 
 def gear(ratio: float, effects=(), reading=None) -> Oscillator:
@@ -102,15 +102,6 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     found = move(gear(ratio), SampledForce(time, force), time)
     assert worst(found[:, 0], exact[:, 0]) < 1e-6
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
-
-
-def test_a_sweep_passes_through_its_frequencies():
-    sweep = Chirp(1.0, 10.0, 50.0, 2.0)
-    # The phase grows by the mean frequency times the duration: sixty turns.
-    phase = 2.0 * np.pi * 60.0
-    assert float(sweep(2.0)) == pytest.approx(np.sin(phase), abs=1e-9)
-    near = np.array([float(sweep(2.0 - h)) for h in (0.0, 1e-6)])
-    assert np.diff(near)[0] / -1e-6 == pytest.approx(2.0 * np.pi * 50.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("friction", [2.0, 20.0])

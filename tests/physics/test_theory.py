@@ -2,15 +2,12 @@
 
 import dataclasses
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.flatten_util import ravel_pytree
 from scipy import integrate
 
 from hdcal.data.records import Geometry
-from hdcal.physics.theory import THEORIES, cup, ring
+from hdcal.physics.theory import THEORIES, cup, peak_stress, ring
 
 E = 210e3
 
@@ -65,25 +62,25 @@ def castigliano(g: Geometry, modulus: float) -> tuple[float, float]:
     return change * rigidity / (force * radius**3), force / (0.5 * change)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_ring_is_castiglianos(seed):
-    gear = some_gear(seed)
+def test_the_ring_is_castiglianos():
+    gear = some_gear(0)
     constant, stiffness = castigliano(gear, E)
     assert constant == pytest.approx(0.14878, abs=5e-6)
     assert constant == pytest.approx(np.pi / 4.0 - 2.0 / np.pi, rel=1e-12)
     assert float(ring(gear, E)) == pytest.approx(stiffness, rel=1e-12)
 
 
+def test_the_largest_stress_is_that_of_the_moment_under_the_load():
+    gear, read = some_gear(1), 0.4
+    moment = float(ring(gear, E)) * read * gear.radius / np.pi
+    section = gear.length * gear.wall_thickness**2 / 6.0
+    assert peak_stress(gear, E, read) == pytest.approx(moment / section, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_cup_in_closed_form(seed):
     gear = some_gear(seed)
     assert float(cup(gear, E)) == pytest.approx(slow_cup(gear, E), rel=1e-10)
-
-
-@pytest.mark.parametrize(("height", "stiffness"), [(70, 39.3), (62, 50.1), (50, 77.0)])
-def test_the_cup_of_the_articles_gear(gear, height, stiffness):
-    found = float(cup(with_size(gear, load_height=float(height)), E))
-    assert found == pytest.approx(stiffness, abs=0.05)
 
 
 def test_an_endless_cup_is_a_tube(gear):
@@ -95,28 +92,14 @@ def test_an_endless_cup_is_a_tube(gear):
     assert float(cup(long, E)) == pytest.approx(tube, rel=1e-6)
 
 
-EXPONENTS = {
-    "ring": {
-        "wall_thickness": 3,
-        "radius": -3,
-        "length": 1,
-        "load_height": 0,
-        "poisson": 0,
-    },
-    "cup": {"wall_thickness": 3, "load_height": -2},
-    "article": {
-        "wall_thickness": 3,
-        "radius": -3,
-        "length": 0,
-        "load_height": 0,
-        "poisson": 0,
-    },
-}
-
-
 @pytest.mark.parametrize(
     ("name", "size", "exponent"),
-    [(name, *law) for name, laws in EXPONENTS.items() for law in laws.items()],
+    [
+        *(("ring", "wall_thickness", 3), ("ring", "radius", -3), ("ring", "length", 1)),
+        *(("cup", "wall_thickness", 3), ("cup", "load_height", -2)),
+        *(("article", "wall_thickness", 3), ("article", "radius", -3)),
+        *(("ring", "load_height", 0), ("ring", "poisson", 0), ("article", "length", 0)),
+    ],
 )
 def test_scaling(gear, name, size, exponent):
     larger = with_size(gear, **{size: 1.3 * getattr(gear, size)})
@@ -136,16 +119,3 @@ def test_a_gear_twice_as_large_is_twice_as_stiff(gear, name):
 def test_linear_in_the_modulus(gear, theory):
     unit = float(theory(gear, 1.0))
     assert float(theory(gear, E)) == pytest.approx(E * unit, rel=1e-13)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_gradients(theory, differences, seed):
-    point = (some_gear(seed), E)
-
-    def function(point):
-        return jnp.log(theory(*point))
-
-    exact = ravel_pytree(jax.grad(function)(point))[0]
-    assert exact.shape == (6,)
-    slow = differences(function, point)
-    np.testing.assert_allclose(exact, slow, rtol=1e-8, atol=1e-11)

@@ -92,7 +92,7 @@ def test_offsets_of_runs_are_no_effect_of_a_gear():
 def test_offsets_of_runs_of_any_size_leave_the_evidence_unchanged(one_gear):
     force = one_gear.records.force + 5.0 * one_gear.records.run
     moved = replace(one_gear, records=replace(one_gear.records, force=force))
-    one, other = (weigh_gear(0, each, FRICTION, 0)[1] for each in (one_gear, moved))
+    one, other = (weigh_gear(each, FRICTION, 0) for each in (one_gear, moved))
     for cause in one:
         found = other[cause].log_evidence - other["none"].log_evidence
         expected = one[cause].log_evidence - one["none"].log_evidence
@@ -133,23 +133,19 @@ def test_evidence_is_the_mean_over_the_hypotheses(one_gear):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("where", ["two processes", "a cluster"])
-def test_shared_work_gives_the_same_answer(with_loop, where, request):
-    shares: dict = {"jobs": 2}
-    if where == "a cluster":
-        shares = {"scheduler": request.getfixturevalue("local").scheduler_address}
-    again = hdcal.causes(fleet(0.8), library=LIBRARY, **shares)
+def test_shared_work_gives_the_same_answer(with_loop):
+    again = hdcal.causes(fleet(0.8), library=LIBRARY, jobs=2)
     assert causes_of(again) == causes_of(with_loop)
     for first, second in zip(again.causes, with_loop.causes, strict=True):
         assert first.cause == second.cause
         assert first.log_evidence_nat == pytest.approx(second.log_evidence_nat, 1e-6)
 
 
-def weighed(index: int, gear, library, seed: int):
+def weighed(gear, library, seed: int):
     """Return evidence as simulated gears have it, at once."""
-    nats = 9.0 if index < 4 else -2.0
-    weights = {"none": Weight(0.0, np.log(0.5))}
-    return index, weights | {"coulomb_friction": Weight(nats, np.log(0.2))}
+    nats = 9.0 if gear.specimen_labels[0] in WITH_LOOP else -2.0
+    friction = Weight(nats, np.log(0.2))
+    return {"none": Weight(0.0, np.log(0.5)), "coulomb_friction": friction}
 
 
 def spoiled(table: pd.DataFrame, how: str) -> pd.DataFrame:
@@ -165,10 +161,10 @@ def spoiled(table: pd.DataFrame, how: str) -> pd.DataFrame:
     return table.assign(force_N=force)
 
 
-def failing(index: int, gear, library, seed: int):
+def failing(gear, library, seed: int):
     if gear.specimen_labels == ("G5",):
-        return index, Finding(gear.name, "its evidence failed", "Leave it out")
-    return weighed(index, gear, library, seed)
+        return Finding(gear.name, "its evidence failed", "Leave it out")
+    return weighed(gear, library, seed)
 
 
 @pytest.mark.parametrize("how", ["few rows", "no scatter", "a word", "evidence"])
@@ -195,7 +191,7 @@ def test_a_failed_evidence_is_a_finding(monkeypatch, one_gear, part, result):
         raise result
 
     monkeypatch.setattr(gear_evidence, part, broken)
-    found = weigh_gear(0, one_gear, FRICTION, 0)[1]
+    found = weigh_gear(one_gear, FRICTION, 0)
     assert isinstance(found, Finding) and "'G1'" in found.file
 
 
@@ -234,7 +230,7 @@ def test_plain_noise_is_no_evidence_of_outliers():
         noise = np.random.default_rng(seed).normal(0.0, 0.3, 20)
         table = {"deformation_mm": x, "force_N": np.round(231.0 * x + noise, 2)}
         gear = hdcal.read_case(table | {"specimen": np.repeat("A", 20)})
-        weight = weigh_gear(0, gear, {"outliers": EFFECTS["outliers"]}, 0)[1]
+        weight = weigh_gear(gear, {"outliers": EFFECTS["outliers"]}, 0)
         found.append(weight["outliers"].log_evidence - weight["none"].log_evidence)
     assert max(found) < np.log(20.0)
     assert np.mean(np.exp(found)) < 1.5

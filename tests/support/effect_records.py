@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.flatten_util import ravel_pytree
 from rigs import make_records
 
 from hdcal.data.records import Geometry, Records
@@ -86,24 +84,3 @@ def scattered() -> Callable[[int], Records]:
         )
 
     return make
-
-
-@pytest.fixture(scope="session")
-def differences() -> Callable:
-    """Return the slow derivative: fourth-order central differences, leaf by leaf."""
-
-    def gradient(function: Callable, point, step: float = 1e-3, least: float = 1e-3):
-        flat, unravel = ravel_pytree(point)
-        flat = np.asarray(flat)
-        slope = np.zeros(len(flat))
-        for index in range(len(flat)):
-            h = step * max(abs(flat[index]), least)
-            unit = np.eye(len(flat))[index] * h
-            near = function(unravel(jnp.asarray(flat + unit)))
-            near -= function(unravel(jnp.asarray(flat - unit)))
-            far = function(unravel(jnp.asarray(flat + 2.0 * unit)))
-            far -= function(unravel(jnp.asarray(flat - 2.0 * unit)))
-            slope[index] = (8.0 * float(near) - float(far)) / (12.0 * h)
-        return slope
-
-    return gradient

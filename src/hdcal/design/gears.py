@@ -18,7 +18,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.force_model.residuals import noise_warnings
-from hdcal.physics.profile import peak_stress
+from hdcal.physics.theory import peak_stress
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.joint import JointModel, joint
 from hdcal.prediction.models import Models, averaging_words

@@ -14,7 +14,7 @@ from hdcal.design.charts import study_chart
 from hdcal.design.gears import Gears, calibrated_gears
 from hdcal.design.result import DesignResult, shared_fields
 from hdcal.errors import Finding, InputError
-from hdcal.physics.profile import peak_stress
+from hdcal.physics.theory import peak_stress
 from hdcal.prediction.models import Models
 from hdcal.prediction.sizes import SIZES
 from hdcal.report.charts.chart_spec import Chart

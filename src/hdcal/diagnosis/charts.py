@@ -9,6 +9,7 @@ from hdcal.data.case import Case
 from hdcal.data.loading import movement_words
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.which import ALL, LIKELY, Cause, Which, either
+from hdcal.evidence.row_features import half_cycles
 from hdcal.quantities import Quantities
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
@@ -48,7 +49,8 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
     x, sense = np.asarray(records.deformation), np.asarray(records.sense)
     words = movement_words(x, case.units.displacement)
     drawn = drawn_rows(rows.residual)
-    halves = _half_cycles(sense, np.asarray(records.run))
+    turns = np.flatnonzero(np.diff(half_cycles(records))) + 1
+    halves = np.split(np.arange(len(x)), turns)
     for way, colour in _COLOURS.items():
         here = sense == way
         if not here.any():
@@ -75,12 +77,6 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
         legend_beside=True,
     )
     return Chart(panels=[panel])
-
-
-def _half_cycles(sense: np.ndarray, run: np.ndarray) -> list[np.ndarray]:
-    """Return the rows of each stretch of one direction within a run."""
-    turns = np.flatnonzero((np.diff(sense) != 0) | (np.diff(run) != 0)) + 1
-    return np.split(np.arange(len(sense)), turns)
 
 
 def _gap(
@@ -124,7 +120,7 @@ def which_chart(which: "Which") -> Chart:
             )
             at += len(group)
     names = [_name(each) for each in (*causes, which.outside, *noise)]
-    return Chart(panels=[_ranked("probability that it acts", bars, names, (0.0, 1.0))])
+    return _ranked("probability that it acts", bars, names, (0.0, 1.0))
 
 
 def _name(cause: "Cause") -> str:
@@ -140,10 +136,10 @@ def _ranked(
     bars: list[Mark],
     names: list[str],
     limits: tuple[float | None, float | None] = (None, None),
-) -> Panel:
-    """Return a panel of bars with room for long names."""
+) -> Chart:
+    """Return bars with room for long names."""
     lines = max((len(wrap(name, 40)) for name in names), default=1)
-    return Panel(
+    panel = Panel(
         x="",
         y=axis,
         marks=bars,
@@ -153,18 +149,19 @@ def _ranked(
         wide=True,
         height=1.0 + (0.2 + 0.15 * lines) * max(len(names), 2),
     )
+    return Chart(panels=[panel])
 
 
 def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
     """Return what each model leaves, from the straight model to the noise."""
     rungs = [rung for rung in far.ladder if rung.model != FORMULA]
     rms = np.array([rung.rms_N for rung in rungs])
-    at = np.arange(1.0, len(rms) + 1.0)
+    at, end = np.arange(1.0, len(rms) + 1.0), len(rms)
+    groups = (0, 1, SKY), (1, end - 1, BLUE), (end - 1, end, GREY)
     bars: list[Mark] = [
-        Bars(at=at[:1], high=rms[:1], colour=SKY),
-        Bars(at=at[1:-1], high=rms[1:-1], colour=BLUE),
-        Bars(at=at[-1:], high=rms[-1:], colour=GREY),
+        Bars(at=at[first:last], high=rms[first:last], colour=colour)
+        for first, last, colour in groups
+        if first < last
     ]
     axis = load_axis(units, "root mean square of what is left")
-    bars = [each for each in bars if isinstance(each, Bars) and len(each.at)]
-    return Chart(panels=[_ranked(axis, bars, [rung.model for rung in rungs])])
+    return _ranked(axis, bars, [rung.model for rung in rungs])

@@ -40,7 +40,6 @@ class Decision:
         gap: probability that something acts.
         gap_N: rms of what acts on the mean reading, where it does [N]; None where no
             draws were made.
-        which: what acts, and which share of the gap's rms it explains.
         explanations: all that are possible, the most probable first.
         hypotheses: probability of each hypothesis on the mean reading and effect on
             the noise.
@@ -210,7 +209,7 @@ def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -
     errors = errors - (errors @ half.T) @ half
     errors = errors / np.linalg.norm(errors, axis=1, keepdims=True)
     inside = [
-        np.log(np.sum((errors @ white(kernel).T) ** 2, axis=1) + 1e-300)
+        np.log(np.sum((errors @ white(kernel.columns).T) ** 2, axis=1) + 1e-300)
         for kernel in searched.kernels
     ]
     table = np.stack(inside, axis=1)

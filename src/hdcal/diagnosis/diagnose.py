@@ -52,7 +52,7 @@ def diagnose(
         library: effects to consider, by name; by default all of them.
         quick: without calibrating the models that are left.
         seed: of all random numbers.
-        progress: called with (iterations done, iterations in all) while sampling.
+        progress: called with the iterations done and all of them while sampling.
 
     Raises:
         InputError: library or seed is invalid, an effect has no prior, the force does
@@ -81,7 +81,7 @@ def diagnose(
         how_far=_how_far(case, searched, fit, names, rng),
         next_test=tuple(
             run.model_copy(update={"run": case.units.say(run.run)})
-            for run in rank_runs(searched, posterior, rng)
+            for run in rank_runs(searched, posterior)
         ),
         refits=tuple(Refit(hypothesis=n, probability=p) for n, (p, _) in ranked),
         left_out=fits.left_out,

@@ -11,10 +11,7 @@ _MINUS = "minus:"
 
 
 def choose_library(spec: str | None = None) -> dict[str, type[Effect]]:
-    """Return the library with some effects withheld.
-
-    Args:
-        spec: `minus:NAME[,NAME…]`, or None for the whole library.
+    """Return the library without the effects of `minus:NAME[,NAME…]`.
 
     Raises:
         InputError: the form or a name is unknown; the nearest name is suggested.

@@ -98,14 +98,9 @@ def all_findings(refused: Refused) -> list[Finding]:
 def diagnose_many(
     cases: Sequence[Case], refused: Refused, folder: Path, *, jobs: int, **how
 ) -> Diagnoses:
-    """Diagnose every case and write its result into a folder of its name.
+    """Diagnose every case in processes and write its result into a folder of its name.
 
-    Args:
-        cases: with different names.
-        refused: what is wrong with cases that could not be read.
-        folder: to write into.
-        jobs: number of processes.
-        how: arguments of `diagnose_into`.
+    Cases have different names; `refused` is what is wrong with the others.
 
     Raises:
         InputError: holds everything that is wrong where no case can be used.
@@ -161,15 +156,7 @@ def diagnose_into(
 ) -> "Diagnosis":
     """Diagnose a case, and write the result once all files are made.
 
-    Args:
-        folder: to write into.
-        case: to diagnose.
-        command: how the result is made.
-        library: as in `choose_library`.
-        quick: without calibrations.
-        report: also write the page and its figures.
-        seed: of the random numbers.
-        progress: of the sampling.
+    The library is given as in `choose_library`; a page with figures is the report.
     """
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library

@@ -1,8 +1,12 @@
 """Suggested runs, ranked by their information about the cause for their effort.
 
-The information of a run is that between the index of the true hypothesis and its
-Gaussian predictive [nat]. A remainder outside the library predicts nothing and is left
+The information is that between the true hypothesis and the readings of a run, which are
+Gaussian under each [nat]. A remainder outside the library predicts nothing and is left
 out.
+
+Source:
+    Kolchinsky and Tracey, Entropy 19 (2017): a lower bound of the information from
+    Bhattacharyya distances.
 """
 
 from collections import defaultdict
@@ -16,7 +20,8 @@ from jaxtyping import Float
 
 from hdcal.data.records import Records
 from hdcal.evidence.base_model import base_columns
-from hdcal.evidence.effect_curves import effect_curves, padded_records
+from hdcal.evidence.components import effect_curves
+from hdcal.evidence.linear_problem import padded_records
 from hdcal.evidence.parts import LinearPosterior, Part, coefficients, posterior
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
@@ -27,8 +32,8 @@ from hdcal.report.item import EffectName, Item, Words
 _ROWS, _PACE, _HOLD = 32, 5.0, 60.0
 # Changes of temperature [°C] that are suggested, and that count as one.
 _WARMER, _SAME = 30.0, 5.0
-# Hypotheses that take part, draws of each, and the least that is worth a run.
-_MOST, _DRAWS, _LEAST_NATS, _LEAST_SHARE = 6, 256, 0.02, 0.01
+# Hypotheses that take part, their least share, and the least that is worth a run.
+_MOST, _LEAST_SHARE, _LEAST_NATS = 6, 0.01, 0.02
 
 
 class NextRun(Item):
@@ -59,12 +64,7 @@ class Candidate(NamedTuple):
 def candidate_runs(
     records: Records, reference_temperature: float
 ) -> Iterator[Candidate]:
-    """Yield runs that show what the measured ones cannot.
-
-    Args:
-        records: what was measured, run after run.
-        reference_temperature: T_ref of the gear [°C].
-    """
+    """Yield runs that show what the measured ones cannot, given T_ref [°C]."""
     known, paths, pace = records.known, _paths(records), _pace(records)
     warmth = np.asarray(records.temperature)
     first, last = float(warmth[0]), float(warmth[-1])
@@ -97,7 +97,7 @@ def candidate_runs(
     yield run(words, one, 1.5, paths["inner"])
     words = "load to 1.25 of the tested {displacement}"
     yield run(words, "one run beyond the tested range", 5.0, paths["beyond"])
-    if np.ptp(records.angle) == 0.0:
+    if np.ptp(records.angle) < np.pi / 2.0:
         angle = float(records.angle[-1]) + np.pi / 2.0
         words = "turn the gear by 90° and load again"
         yield run(words, mounting, 2.0, paths["up"], angle=angle)
@@ -155,17 +155,9 @@ def _run(records: Records, path, pace: float, **columns) -> Records:
 
 
 def rank_runs(
-    searched: Searched,
-    posterior_of: Mapping[Names, np.ndarray],
-    rng: np.random.Generator,
+    searched: Searched, posterior_of: Mapping[Names, np.ndarray]
 ) -> tuple[NextRun, ...]:
-    """Rank runs by their information about the cause for their effort, best first.
-
-    Args:
-        searched: hypotheses of the case.
-        posterior_of: probability of each, by model of the noise.
-        rng: source of randomness.
-    """
+    """Rank runs by their information about the cause for their effort, best first."""
     share, problem = _likeliest(searched, posterior_of), searched.problem
     if len(share) < 2:
         return ()
@@ -175,13 +167,13 @@ def rank_runs(
         posterior(problem, table.likeliest_noise(key), each)
         for key, each in zip(names, parts, strict=True)
     ]
-    # The same random numbers for every run: they are compared with each other.
-    drawn, ranked = rng.normal(size=(_DRAWS, _ROWS)), []
+    ranked = []
     for run in candidate_runs(problem.records, problem.reading.reference_temperature):
-        mean, covariance = _predicted(searched, parts, fits, run.records)
-        nats = _information(mean, covariance, weight, drawn)
+        apart = _distances(*_predicted(searched, parts, fits, run.records))
+        nats = float(-weight @ np.log(np.exp(-apart) @ weight))
         if nats >= _LEAST_NATS:
-            one, two = _farthest(mean, covariance, weight)
+            farthest = np.argmax(apart * np.outer(weight, weight))
+            one, two = sorted(np.unravel_index(farthest, apart.shape))
             found = NextRun(
                 run=run.words,
                 separates=_differing(names[one], names[two]),
@@ -264,25 +256,9 @@ def _on_run(searched: Searched, part: Part, after: Records):
     return curves[0] + (part.mean[0] - low) * slope, part.sd[0] * slope[None]
 
 
-def _information(mean, covariance, share: Float[np.ndarray, " h"], normal) -> float:
-    """Return the mutual information of hypothesis and readings of one run [nat]."""
-    factor = np.linalg.cholesky(covariance)
-    inverse = np.linalg.inv(factor)
-    half_log_det = np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)
-    total = 0.0
-    for index in range(len(share)):
-        drawn = mean[index] + normal @ factor[index].T
-        off = (drawn - mean[:, None]) @ np.swapaxes(inverse, 1, 2)
-        heights = -0.5 * np.einsum("hdm,hdm->hd", off, off) - half_log_det[:, None]
-        top = np.logaddexp.reduce(heights + np.log(share)[:, None], axis=0)
-        total += share[index] * float(np.mean(heights[index] - top))
-    return max(total, 0.0)
-
-
-def _farthest(mean, covariance, share: Float[np.ndarray, " h"]) -> tuple[int, int]:
-    """Return the two hypotheses whose readings differ most."""
-    one, two = np.triu_indices(len(share), 1)
-    gap, both = mean[one] - mean[two], covariance[one] + covariance[two]
-    squared = np.sum(gap * np.linalg.solve(both, gap[..., None])[..., 0], axis=1)
-    best = int(np.argmax(squared * share[one] * share[two]))
-    return int(one[best]), int(two[best])
+def _distances(mean, covariance) -> Float[np.ndarray, "h h"]:
+    """Return the Bhattacharyya distances between Gaussians."""
+    gap, both = mean[:, None] - mean, 0.5 * (covariance[:, None] + covariance)
+    squared = np.sum(gap * np.linalg.solve(both, gap[..., None])[..., 0], axis=-1)
+    own, joint = (np.linalg.slogdet(each)[1] for each in (covariance, both))
+    return squared / 8.0 + 0.5 * joint - 0.25 * (own[:, None] + own)

@@ -17,8 +17,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.base_model import moments
-from hdcal.evidence.effect_curves import padded_records
-from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.linear_problem import LinearProblem, padded_records
 from hdcal.exported import jit
 from hdcal.inference.force_model.noise_form import loop_cells
 from hdcal.inference.force_model.residual_shapes import (
@@ -194,12 +193,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
 
 
 def find_patterns(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
-    """Return the contrasts that noise would rarely show, the clearest first.
-
-    Args:
-        problem: rows and base model.
-        case: for labels and the correlation of its noise.
-    """
+    """Return the contrasts that noise would rarely show, the clearest first."""
     records = problem.records
     # Of a gear that is pulled the statements are about the size of its force.
     side = loading_side(np.asarray(records.deformation))

@@ -63,15 +63,7 @@ def refit(
     seed: int,
     progress: "Progress | None",
 ) -> Refits:
-    """Calibrate every hypothesis that is probable enough by NUTS.
-
-    Args:
-        case: data and gear.
-        hypotheses: their probabilities, sum 1.
-        library: effects by name.
-        seed: of the sampler.
-        progress: of it.
-    """
+    """Calibrate every hypothesis that is probable enough; probabilities sum to 1."""
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
@@ -103,12 +95,7 @@ def refit(
 def weighed(
     probabilities: Mapping[str, float], calibrated: Callable[[str], Posterior]
 ) -> Refits:
-    """Return the hypotheses that are kept, with their probabilities.
-
-    Args:
-        probabilities: of all hypotheses, sum 1.
-        calibrated: returns the posterior of one.
-    """
+    """Return the hypotheses that are kept; probabilities of all sum to 1."""
     fits = {name: calibrated(name) for name in _probable(probabilities)}
     usable = {name: fit for name, fit in fits.items() if fit.usable}
     missing = max(1.0 - sum(probabilities[name] for name in usable), 0.0)

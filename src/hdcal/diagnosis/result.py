@@ -81,15 +81,7 @@ class Refit(Item):
 
 
 class Data(Item):
-    """Which data they were.
-
-    Attributes:
-        name: of the case.
-        rows: that were read.
-        rows_diagnosed: of these or of means of neighbours.
-        sha256: of the source.
-        notes: from reading them.
-    """
+    """Which data they were; rows or means of neighbours were diagnosed."""
 
     name: str
     rows: Count
@@ -112,10 +104,6 @@ class Diagnosis(Result):
         stiffness_N_per_mm: as read, over the calibrated models.
         coarse_step_N: step of forces that are read coarsely; 0 where they are not.
         library: names of the effects that were considered.
-        seed: of the random numbers.
-        versions: of the packages.
-        data: that were diagnosed.
-        case: likewise.
         rows: gap and residual of each.
         posteriors: the calibrated models with their probabilities.
     """

@@ -133,7 +133,6 @@ class Which(Item):
     Attributes:
         verdict: in a word.
         causes: classes of effects, the most probable first.
-        outside: something outside the library.
         explanations: the smallest set of them with 90 %.
         inclusion: probability that each effect acts.
         fits: whether the likeliest explanation fits.

@@ -28,8 +28,7 @@ def stiffness_prior(
 ) -> tuple[float, float, float]:
     """Return the prior of the log stiffness as read, gauge gains included.
 
-    Returns:
-        Its mean and sd [log N/mm], and the stiffness at K = 1 [N/mm].
+    Its mean and sd [log N/mm], and the stiffness at K = 1 [N/mm].
     """
     (log_k, k_sd), (log_e, e_sd) = (_log_moments(priors, name) for name in ("K", "E0"))
     formula = float(THEORIES[case.gear.theory](case.gear.geometry, np.exp(log_e)))
@@ -55,15 +54,9 @@ def base_at(
     stiffness: float | None,
     expected: float,
 ) -> Base:
-    """Return the base parameters, the stiffness by least squares unless given.
+    """Return the base parameters, the stiffness [N/mm] by least squares unless given.
 
-    Args:
-        records: the rows.
-        reading: how the rig reads.
-        priors: by site name.
-        noise_sd: of a reading [N].
-        stiffness: to use [N/mm]; None estimates it.
-        expected: stiffness in place of one that is not positive [N/mm].
+    The expected stiffness takes the place of one that is not positive.
     """
     names = ("alpha", "deformation_offset", "force_offset")
     alpha, zero, offset = (moments(priors, name)[0] for name in names)
@@ -87,17 +80,16 @@ def base_columns(
 ) -> Float[np.ndarray, "n 4"]:
     """Return the change of each row by one prior sd of each base parameter [N]."""
     rise = np.asarray(records.temperature) - reading.reference_temperature
-    per_read = reading.radial_per_read
+    per_read, stiffness = reading.radial_per_read, float(base.stiffness)
     radial = (np.asarray(records.deformation) - base.deformation_offset) * per_read
     soft = 1.0 - base.alpha * rise
-    slope = [
-        log_sd * radial * soft,
-        -moments(priors, "alpha")[1] * rise * radial,
-        -moments(priors, "deformation_offset")[1] * per_read * soft,
+    columns = [
+        stiffness * (log_sd * radial * soft),
+        np.full(len(rise), moments(priors, "force_offset")[1]),
+        stiffness * (-moments(priors, "alpha")[1] * rise * radial),
+        stiffness * (-moments(priors, "deformation_offset")[1] * per_read * soft),
     ]
-    offset = np.full(len(rise), moments(priors, "force_offset")[1])
-    stiffness, modulus, zero = float(base.stiffness) * np.stack(slope)
-    return np.stack([stiffness, offset, modulus, zero], axis=1)
+    return np.stack(columns, axis=1)
 
 
 def run_columns(records: Records) -> Float[np.ndarray, "n r"]:

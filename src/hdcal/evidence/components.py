@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float
 from scipy.special import erf
 
 from hdcal.data.records import Records
-from hdcal.evidence.effect_curves import effect_curves
 from hdcal.evidence.items import STEPS, Amplitudes, Atoms, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import (
@@ -24,6 +23,9 @@ from hdcal.evidence.parameter_grid import (
     ParameterGrid,
     make_grid,
 )
+from hdcal.exported import jit
+from hdcal.inference.force_model.padding import repeat_last_row
+from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.scatter import Scatter, scores
 
@@ -43,6 +45,9 @@ _COLUMNS = {
 # Relative deviation from proportionality from which an effect is nonlinear.
 _NONLINEAR = 1e-6
 _ROOT_2PI = float(np.sqrt(2.0 * np.pi))
+# Points predicted at a time, always as many: one executable serves all grids. With
+# many rows fewer, 2**22 numbers of eight bytes being 32 MB.
+_BLOCK, _MOST_VALUES = 64, 2**22
 
 
 def lacking(
@@ -105,7 +110,7 @@ def components(
     return Components(names, tuple(grids), together, tuple(spaces))
 
 
-def _curves(effect: type[Effect], values: dict, problem: LinearProblem):
+def _of_rows(effect: type[Effect], values: dict, problem: LinearProblem):
     found = effect_curves(effect, values, problem.base, problem.padded, problem.reading)
     return found[:, : len(problem.y)]
 
@@ -115,7 +120,7 @@ def _one_amplitude(
 ) -> tuple[ParameterGrid, Atoms]:
     """Return the atoms of an effect with one amplitude, and the grid that they use."""
     ends = np.array([grid.unit, grid.unit / 2.0])
-    table = _curves(grid.effect, grid.at(ends), problem).reshape(grid.size, 2, -1)
+    table = _of_rows(grid.effect, grid.at(ends), problem).reshape(grid.size, 2, -1)
     deviation = np.max(np.abs(table[:, 0] - 2.0 * table[:, 1]))
     if grid.normal and deviation <= _NONLINEAR * np.max(np.abs(table)):
         return grid, _linear_atoms(owner, grid, table[:, 0] / grid.unit)
@@ -149,7 +154,7 @@ def _linear_atoms(
 
 def _cell_atoms(owner: int, grid: ParameterGrid, problem: LinearProblem) -> Atoms:
     edges, mass = grid.cells()
-    table = _curves(grid.effect, grid.at(edges), problem)
+    table = _of_rows(grid.effect, grid.at(edges), problem)
     table, width = table.reshape(grid.size, len(edges), -1), np.diff(edges)
     slope = np.diff(table, axis=1) / width[:, None]
     offset = table[:, :-1] - slope * edges[:-1, None]
@@ -176,7 +181,7 @@ def _several_amplitudes(
 ) -> list[Space]:
     """Return a space for each shape point of an effect with several amplitudes."""
     count = len(grid.amplitudes)
-    table = _curves(grid.effect, grid.at(grid.sd * np.eye(count)), problem)
+    table = _of_rows(grid.effect, grid.at(grid.sd * np.eye(count)), problem)
     table = table.reshape(grid.size, count, -1)
     shown = np.flatnonzero(_shown(grid, problem))
     weights = np.log(SCALE_WEIGHTS) - np.log(len(shown))
@@ -184,7 +189,7 @@ def _several_amplitudes(
 
 
 def _shown(grid: ParameterGrid, problem: LinearProblem) -> Bool[np.ndarray, " s"]:
-    """Return the shape points that these rows can show.
+    """Whether these rows can show each shape point.
 
     Less than one period is a bend like any other. Where the prior has only longer
     periods than the stroke, the period is known and all points stay.
@@ -201,10 +206,47 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     label = np.asarray(getattr(problem.records, effect.members))
     padded = getattr(problem.padded, effect.members)
     score = np.asarray(scores(padded))[: len(label)]
-    added = _curves(effect, {"sd": np.ones(1)}, problem)[0] / score
+    added = _of_rows(effect, {"sd": np.ones(1)}, problem)[0] / score
     columns = added * (label == np.unique(label)[:, None])
     sd = make_grid(effect, problem.priors).sd
     edges = np.concatenate([[0.0], np.sqrt(STEPS[1:] * STEPS[:-1]), [np.inf]])
     below = erf(edges[:, None] / (np.sqrt(2.0) * SCALES)) @ SCALE_WEIGHTS
     log_mass = np.log(np.maximum(np.diff(below), 1e-300))
     return Space(owner, principal(columns), sd * STEPS, log_mass)
+
+
+@jit
+def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
+    plain, _ = predict_reading(base, (), records, reading)
+
+    def one(effect):
+        return predict_reading(base, (effect,), records, reading)[0] - plain
+
+    return jax.vmap(one)(effects)
+
+
+def effect_curves(
+    effect: type[Effect],
+    values: dict[str, np.ndarray],
+    base: Base,
+    padded: Records,
+    reading: Reading,
+) -> np.ndarray:
+    """Return the effect's contribution to the mean reading [N], shape (g, n).
+
+    Args:
+        effect: the effect.
+        values: of every parameter, each of shape (g,).
+        base: the force model about which it acts.
+        padded: the rows, from `padded_records`; all of them are predicted.
+        reading: how the rig reads.
+    """
+    block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
+    table = {name: np.asarray(column, float) for name, column in values.items()}
+    count = len(next(iter(table.values())))
+    table = repeat_last_row(table, count + -count % block)
+    parts = []
+    for start in range(0, count, block):
+        some = {name: column[start : start + block] for name, column in table.items()}
+        parts.append(np.asarray(_curves(effect(**some), base, padded, reading)))
+    return np.concatenate(parts)[:count]

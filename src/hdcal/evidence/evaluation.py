@@ -31,7 +31,6 @@ class Selection:
     """Atoms and spaces that are compared given every context.
 
     Attributes:
-        problem: the case.
         atoms: the most probable ones, with the weight of all.
         tolerance: columns of their shapes' tolerance at a relative sd of 1, (m, l, n).
         spaces: effects with several columns, and kernels; wide ones first.
@@ -57,13 +56,9 @@ class Selection:
         extra: Sequence[Space] = (),
         only: set[int] | None = None,
     ) -> "Evaluated":
-        """Evaluate every item.
+        """Evaluate every item, or those of some components.
 
-        Args:
-            noise: model of the noise.
-            context: what the base contains besides.
-            extra: further narrow spaces of the remainder, that depend on the context.
-            only: the components that are wanted; by default all.
+        `extra` are further narrow spaces of the remainder, that depend on the context.
         """
         projection = Projection(self.problem, noise, context)
         atoms, wide, narrow = self._whitened(projection)
@@ -133,7 +128,6 @@ class Evaluated:
     """Evidence of all items given one context.
 
     Attributes:
-        selection: the items.
         none: log evidence of the context alone.
         atoms: those with an amplitude.
         spaces: log evidence of the others at each scale, `extra` last.
@@ -238,12 +232,8 @@ def select(
 ) -> Selection:
     """Return the most probable atoms of each effect, with the weight of all of them.
 
-    Args:
-        problem: the case.
-        noises: models of the noise over which atoms are compared.
-        effects: of the library.
-        kernels: of the remainder.
-        names: of all components, the remainder last.
+    Atoms are compared over all models of the noise. `names` are those of all
+    components, the remainder last.
     """
     atoms, spaces = effects.atoms, (*effects.spaces, *kernels)
     if not len(atoms.owner):

@@ -21,8 +21,6 @@ class Amplitudes(NamedTuple):
     The density is exp(log_height − precision · (a − mean)² / 2) from low to high.
 
     Attributes:
-        low: least amplitude.
-        high: largest amplitude.
         mean: centre of the normal.
         precision: of the normal; 0 where the density is flat.
         log_height: log density at the centre.

@@ -25,11 +25,11 @@ from hdcal.evidence.base_model import (
     run_columns,
     stiffness_prior,
 )
-from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.row_features import take_rows, tolerance_functions
 from hdcal.inference import distributions
 from hdcal.inference.force_model import serial_correlation
 from hdcal.inference.force_model.noise_form import pilot_fit
+from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.priors import problem_priors
 from hdcal.inference.force_model.problem import case_reading
 from hdcal.physics.chain import Base, Reading
@@ -37,8 +37,6 @@ from hdcal.physics.effect import Effect
 
 # Least noise sd as a share of the largest force: computed readings have no noise.
 _LEAST_NOISE = 1e-6
-# Numbers that are whitened at a time: more do not fit into a processor's cache.
-_AT_HAND = 2**16
 
 
 @dataclass(frozen=True)
@@ -102,35 +100,16 @@ class LinearProblem:
     ) -> Float[np.ndarray, "*g n"]:
         """Return curves in which the noise is independent and of equal sd.
 
-        As `serial_correlation.whiten`, a few curves at a time.
-
-        Args:
-            curves: rows along the last axis.
-            weight: one over the relative noise sd of each row, shape (n,).
-            correlation: AR(1) coefficient of the noise.
+        As `serial_correlation.whiten`, with rows along the last axis, which is faster
+        here. The weight of a row is one over its relative noise sd.
         """
+        scaled = curves * weight
         if correlation == 0.0:
-            return curves * weight
-        follows = self.before >= 0
-        gain = (1.0 - correlation**2) ** -0.5
-        scale = weight * np.where(follows, gain, 1.0)
-        tied = weight[self.before] * np.where(follows, correlation * gain, 0.0)
-        table = curves.reshape(-1, curves.shape[-1])
-        white, step = np.empty_like(table), max(1, _AT_HAND // len(weight))
-        for start in range(0, len(table), step):
-            few, found = table[start : start + step], white[start : start + step]
-            np.multiply(few, scale, out=found)
-            if self._in_order:
-                found[:, 1:] -= few[:, :-1] * tied[1:]
-            else:
-                found -= few[:, self.before] * tied
-        return white.reshape(curves.shape)
-
-    @cached_property
-    def _in_order(self) -> bool:
-        """Whether the row before one in its run is the row above it, if any is."""
-        follows = np.flatnonzero(self.before >= 0)
-        return bool(np.all(self.before[follows] == follows - 1))
+            return scaled
+        follows, gain = self.before >= 0, (1.0 - correlation**2) ** -0.5
+        scale = np.where(follows, gain, 1.0)
+        tied = np.where(follows, correlation * gain, 0.0)
+        return scale * scaled - tied * scaled[..., self.before]
 
     @property
     def count(self) -> int:
@@ -154,6 +133,15 @@ class LinearProblem:
         return replace(self, y=self.y - offset, X=X)
 
 
+def padded_records(records: Records) -> Records:
+    """Return records of a length that many cases share.
+
+    `known` is left out: everything would be compiled anew for it, and only the `needs`
+    of effects depend on it.
+    """
+    return pad_records(replace(records, known=frozenset()))
+
+
 def linear_problem(
     case: Case,
     library: Mapping[str, type[Effect]],
@@ -162,14 +150,10 @@ def linear_problem(
     stiffness: float | None = None,
     free_runs: bool = False,
 ) -> LinearProblem:
-    """Return the linear problem of a case.
+    """Return the linear problem of a case, with the priors of effects by name.
 
-    Args:
-        case: gear and records.
-        library: effects whose priors are wanted, by name.
-        noise_sd: reference noise sd [N]; by default estimated.
-        stiffness: about which effects are evaluated [N/mm]; by default estimated.
-        free_runs: whether each run has an unknown force offset.
+    Reference noise sd [N] and the stiffness about which effects are evaluated [N/mm]
+    are estimated unless given. With `free_runs` each run has an unknown force offset.
 
     Raises:
         InputError: an effect has no prior.

@@ -59,10 +59,7 @@ class Marginal(NamedTuple):
 
 
 class _Given(NamedTuple):
-    """Products at a noise variance when the loose columns are integrated out.
-
-    `used` is the number of rows that they use up.
-    """
+    """Products at a noise variance, and the rows that the loose columns use up."""
 
     log_det: np.ndarray
     ee: np.ndarray
@@ -116,14 +113,10 @@ def log_marginal(
     prior: Amplitudes,
     sigma: Any,
 ) -> Marginal:
-    """Return the log marginal likelihood of each item.
+    """Return the log marginal likelihood of each item in `count` rows.
 
-    Args:
-        count: number of rows.
-        products: inner products of the items.
-        variance: prior variances of the coefficients of their loose columns.
-        prior: of their amplitudes.
-        sigma: frozen distribution of the noise sd [N].
+    Given are prior variances of the coefficients of loose columns, priors of the
+    amplitudes, and the frozen distribution of the noise sd [N].
     """
     if not products.ee.size:
         return Marginal(*3 * [np.zeros(variance.shape)])

@@ -71,15 +71,10 @@ def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
 def correlated_noise(
     problem: LinearProblem, error: Float[np.ndarray, " n"], largest: float
 ) -> NoiseModel:
-    """Return equal noise with the correlation that errors have.
+    """Return equal noise with the correlation that errors [N] have, up to the largest.
 
     Its prior is the mass of a normal around it: uniform over the correlation times the
     width of its likelihood.
-
-    Args:
-        problem: the case.
-        error: of the rows [N], shape (n,).
-        largest: correlation that is allowed.
     """
     follows = problem.before >= 0
     error = error * problem.weight
@@ -135,12 +130,8 @@ def outliers(
     There is none where wild rows agree with their neighbours: that is structure. The
     probabilities that rows are wild come from an EM fit. With any such probabilities
     the evidence of every hypothesis is a lower bound, which is tight where rows are
-    clearly wild or clearly not.
-
-    Args:
-        problem: the case.
-        correlation: of the noise; none is tried as well.
-        fitted: weights of rows → mean reading given some hypothesis.
+    clearly wild or clearly not. `fitted` maps weights of rows to the mean reading given
+    some hypothesis. No correlation is tried as well.
     """
     quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
     ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
@@ -180,9 +171,7 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
 def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
     """Whether wild rows err too often to the same side as wild rows before them.
 
-    Args:
-        wild: errors of wild rows, 0 of the others.
-        before: index of the row before each in its run, −1 for none.
+    The errors of rows that are not wild are 0.
     """
     pairs = wild * np.where(before >= 0, wild[before], 0.0)
     same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))

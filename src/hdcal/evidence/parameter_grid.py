@@ -76,12 +76,10 @@ class ParameterGrid:
         return self.mean + 2.0 * self.sd
 
     def at(self, amplitudes, shape: int | None = None) -> dict[str, np.ndarray]:
-        """Return parameter values at amplitudes; the amplitude changes first.
+        """Return parameter values at amplitudes, at one or all shape points.
 
-        Args:
-            amplitudes: of the only amplitude, shape (a,); or of several, shape
-                (a, number of amplitudes).
-            shape: index of a shape point; by default all of them.
+        The amplitude changes first. Values of several amplitudes have the shape (a,
+        number of amplitudes).
         """
         table = np.asarray(amplitudes, float).reshape(-1, len(self.amplitudes))
         points = [shape] if shape is not None else range(self.size)
@@ -96,10 +94,10 @@ class ParameterGrid:
     def cells(self) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " c"]]:
         """Return the edges of amplitude cells, and the prior probability of each."""
         if not self.normal:
-            law = frozen(self.prior)
+            prior = frozen(self.prior)
             ends = np.concatenate([[1e-6], np.linspace(0.02, 0.98, 25), [1.0 - 1e-6]])
-            edges = np.unique(law.ppf(ends))
-            return edges, np.maximum(np.diff(law.cdf(edges)), _LEAST)
+            edges = np.unique(prior.ppf(ends))
+            return edges, np.maximum(np.diff(prior.cdf(edges)), _LEAST)
         steps = np.geomspace(_SMALLEST, _LARGEST, _CELLS + 1)
         steps = np.concatenate([[0.0], steps])
         if not self.one_sided:
@@ -113,13 +111,7 @@ class ParameterGrid:
 def make_grid(
     effect: type[Effect], priors: Mapping[str, Prior], kind: Kind = "linear"
 ) -> ParameterGrid:
-    """Return the points of one effect.
-
-    Args:
-        effect: of the library.
-        priors: by site name, `effect.parameter`.
-        kind: how the effect depends on its amplitudes.
-    """
+    """Return the points of one effect; priors are by site, `effect.parameter`."""
     own = {name: priors[f"{effect.name}.{name}"] for name in parameters(effect)}
     amplitudes = tuple(n for n, p in parameters(effect).items() if p.null is not None)
     prior = own[amplitudes[0]]

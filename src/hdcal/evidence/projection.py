@@ -56,8 +56,6 @@ class Projection:
     """The base and a context under one model of the noise.
 
     Attributes:
-        problem: the case.
-        noise: model of the noise.
         square: square of the whitened readings with the base projected out.
         constant: part of every log evidence: priors and volume of the whitening.
     """
@@ -91,15 +89,7 @@ class Projection:
         log_weight: Float[np.ndarray, "m t"],
         *curves: np.ndarray,
     ) -> Block:
-        """Return items whitened.
-
-        Args:
-            owner: as in `Block`, as are all others.
-            amplitude: priors.
-            variance: of the loose coefficients.
-            log_weight: at each of them.
-            curves: offset, slope and loose columns [N].
-        """
+        """Return items whitened; `curves` are offset, slope and loose columns [N]."""
         offset, slope, loose = map(self.whiten, curves)
         gram = loose @ np.swapaxes(loose, 1, 2)
         along = ((loose @ each[..., None])[..., 0] for each in (offset, slope))
@@ -109,10 +99,7 @@ class Projection:
     def evaluate(self, block: Block, only: set[int] | None = None) -> Marginal:
         """Return the evidence of items, with the weights of their prior.
 
-        Args:
-            block: the items.
-            only: the components that are wanted; by default all. The others have no
-                evidence.
+        If some components only are wanted, the others have no evidence.
         """
         rows = slice(None)
         if only is not None:
@@ -154,14 +141,7 @@ class Projection:
         curve: Int[np.ndarray, " m"],
         amplitude: Amplitudes,
     ) -> Marginal:
-        """Return the evidence of curves without loose columns, shape (m, 1).
-
-        Args:
-            offset: of each curve [N].
-            slope: of each curve [N].
-            curve: index of the curve of each item.
-            amplitude: prior of each item.
-        """
+        """Return the evidence of curves without loose columns, shape (m, 1)."""
         curves = self._curves(self.whiten(offset), self.whiten(slope))
         none = np.zeros((len(curve), 0))
         ee, eu, uu = (each[curve] for each in curves[:3])

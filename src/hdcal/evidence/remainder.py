@@ -2,7 +2,7 @@
 
 A kernel is a space: smooth functions of one covariate, labels, products of two of them,
 or a Matérn-½ process over the order of the rows. Local structure is one stretch of rows
-or one period: each family of directions enters with its likeliest member, whose prior
+or one period: of each family of directions the likeliest member enters, and its prior
 is divided by the size of the family.
 """
 
@@ -119,10 +119,7 @@ def _tables(problem: LinearProblem) -> list[Float[np.ndarray, "k n"]]:
 def kernels(problem: LinearProblem, effects: Components, owner: int) -> list[Space]:
     """Return the kernels that the base model leaves and no single effect spans.
 
-    Args:
-        problem: the case.
-        effects: of the library.
-        owner: index of the remainder among the components.
+    `owner` is the index of the remainder among the components.
     """
     visible = []
     for table in _tables(problem):
@@ -173,11 +170,8 @@ def remainder_space(
 ) -> Space:
     """Return a space of the remainder, whose size is unknown.
 
-    Args:
-        problem: the case.
-        owner: index of the remainder among the components.
-        columns: of unit rms together, shape (j, n).
-        choices: number of spaces that this one was chosen from.
+    The columns have an rms of one together, shape (j, n), and are chosen from so many
+    spaces.
     """
     sd = float(problem.priors["gap_sd"].numbers[-1])
     log_weight = np.full(len(STEPS), -np.log(len(STEPS)) - np.log(choices))
@@ -238,10 +232,7 @@ def likeliest_members(
 ) -> list[Space]:
     """Return the member of each family that the readings show most.
 
-    Args:
-        problem: the case, its base with all that is taken as known.
-        families: of pairs of directions.
-        owner: index of the remainder among the components.
+    The base of the problem contains all that is taken as known.
     """
     error = problem.project(problem.y)
     half = np.linalg.solve(problem.root.T, problem.X.T).T

@@ -102,15 +102,9 @@ def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     """Keep every `step`-th row of each run, the first one among them.
 
     A thinned AR(1) series is AR(1) with its coefficient to the power of the step; means
-    of neighbours are not. Without `turns` the rows that are left are evenly spaced.
-
-    Args:
-        case: with rows in the order they were taken.
-        step: 1 leaves the case as it is.
-        turns: count rows from the turns on, and keep those at which the path turns.
+    of neighbours are not. The rows that are left are evenly spaced, unless they are
+    counted from the turns of the path on, which are then kept.
     """
-    if step == 1:
-        return case
     records = _run_after_run(case)
     label = half_cycles(records) if turns else np.asarray(records.run)
     last = np.diff(label, append=label[-1] + 1) != 0
@@ -146,12 +140,7 @@ def with_coarse_step(case: Case) -> Case:
 
 
 def coarse_step(case: Case, noise_sd: float) -> float:
-    """Return the step of the force reading where it matters [N], else 0.
-
-    Args:
-        case: whose gear states the step.
-        noise_sd: of a reading [N].
-    """
+    """Return the stated step of the force reading where it matters [N], else 0."""
     step = case.gear.force_resolution
     return step if step >= _LEAST * noise_sd else 0.0
 

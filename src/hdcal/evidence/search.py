@@ -1,16 +1,31 @@
-"""All hypotheses of a case: made linear, evaluated alone, then extended to pairs."""
+"""All hypotheses of a case: single components, pairs, and both with a remainder.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+Everything is evaluated alone under every model of the noise. Then the most probable
+components become contexts, one after the other, given which everything is evaluated
+again; the best pairs are refined, and evaluated with a remainder.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.evidence.components import Components
-from hdcal.evidence.hypotheses import Hypotheses
+from hdcal.evidence.components import components, lacking
+from hdcal.evidence.evaluation import Evaluated, select
+from hdcal.evidence.items import Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
-from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import posterior
+from hdcal.evidence.noise_models import (
+    GROWING,
+    OUTLIERS,
+    NoiseModel,
+    correlated_noise,
+    equal_noise,
+    growing_noise,
+    outliers,
+)
+from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
+from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
     average_rows,
     coarse_step,
@@ -18,9 +33,22 @@ from hdcal.evidence.row_features import (
     thin_rows,
     with_coarse_step,
 )
-from hdcal.evidence.table import EvidenceTable
+from hdcal.evidence.table import OUTSIDE, EvidenceTable, Names
 from hdcal.physics.effect import Effect
 
+# Components given which others are evaluated; models of the noise used there, and
+# their least probability.
+_CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
+# Log evidence below the best given a context from which on a hypothesis is left out.
+_HOPELESS = 25.0
+# Pairs that are refined, times, and evaluated with a remainder.
+_REFINED, _TIMES = 3, 2
+# Difference of correlations that are the same.
+_SAME_CORRELATION = 0.01
+# Most kernels of a remainder, and prior odds of one more.
+_MOST_KERNELS, _ONE_MORE = 4, 0.25
+# Kernels and local families that share the prior of the remainder, at least.
+_LEAST_SHARING = 15
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
@@ -28,32 +56,9 @@ _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
 
 
-@dataclass(frozen=True)
-class Searched:
-    """All hypotheses of a case, and what they were computed from.
-
-    Attributes:
-        problem: the linear problem.
-        table: evidence of each hypothesis.
-        effects: of the library that predict something for the rows, by name.
-        lacking: columns that each of the others needs and that were not measured.
-        components: of the effects.
-        kernels: columns of each kernel of the remainder [N], shape (j, n).
-        coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
-    """
-
-    problem: LinearProblem
-    table: EvidenceTable
-    effects: Mapping[str, type[Effect]]
-    lacking: Mapping[str, tuple[str, ...]]
-    components: Components
-    kernels: list[np.ndarray]
-    coarse_step: float
-
-
 def search(
     case: Case, library: Mapping[str, type[Effect]], *, free_runs: bool = False
-) -> Searched:
+) -> "Searched":
     """Return the evidence of all hypotheses of a case, of effects by name.
 
     With `free_runs` each run has an unknown force offset, whatever acts.
@@ -63,28 +68,20 @@ def search(
     """
     case = average_rows(with_coarse_step(case))
     problem = linear_problem(case, library, free_runs=free_runs)
-    found = Hypotheses(problem, library)
+    found = Searched(problem, library)
     if _oversampled(problem, found.table):
         return search(thin_rows(case, _STEP), library, free_runs=free_runs)
     about = _expansion(problem, found.table)
     if about is not None:
         problem = linear_problem(case, library, free_runs=free_runs, **about)
-        found = Hypotheses(problem, library, found.kernels)
+        found = Searched(problem, library, found.kernels)
     found.fitted_correlations()
-    step = coarse_step(case, problem.noise_sd)
+    found.coarse_step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
-    if not step:
+    if not found.coarse_step:
         found.other_noises(library)
     found.pairs()
-    return Searched(
-        problem=problem,
-        table=found.table,
-        effects=found.effects,
-        lacking=found.lacking,
-        components=found.components,
-        kernels=[space.columns for space in found.kernels],
-        coarse_step=step,
-    )
+    return found
 
 
 def _oversampled(problem: LinearProblem, table: EvidenceTable) -> bool:
@@ -113,3 +110,189 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
         return None
     stiffness = float(problem.base.stiffness) * (1.0 + deviation)
     return {"noise_sd": noise_sd, "stiffness": stiffness}
+
+
+def _likeliest(found: Evaluated, component: int) -> list[Part]:
+    return [found.likeliest(component)]
+
+
+class Searched:
+    """All hypotheses of a case; everything alone is entered at once.
+
+    Attributes:
+        problem: the linear problem.
+        table: evidence of each hypothesis.
+        effects: of the library that predict something for the rows, by name.
+        lacking: columns that each of the others needs and that were not measured.
+        components: of the effects.
+        kernels: of the remainder.
+        coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
+    """
+
+    coarse_step = 0.0
+
+    def __init__(
+        self,
+        problem: LinearProblem,
+        library: Mapping[str, type[Effect]],
+        known_kernels: list[Space] | None = None,
+    ):
+        self.problem, self.lacking = problem, lacking(library, problem.records)
+        self.effects = {n: e for n, e in library.items() if n not in self.lacking}
+        self.components = effects = components(self.effects, problem)
+        self.outside = len(effects.names)
+        self.families = local_families(problem)
+        self.kernels = known_kernels or kernels(problem, effects, self.outside)
+        sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
+        self.log_sharing = float(np.log(sharing))
+        self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
+        spaces, names = self._sharing(self.kernels), self.table.names
+        self.selection = select(problem, self.table.noises, effects, spaces, names)
+        self.found_alone: dict[int, Evaluated] = {}
+        self._alone(range(len(self.table.noises)))
+
+    def _sharing(self, spaces: Sequence[Space]) -> list[Space]:
+        """Return spaces of the remainder, among which its prior is shared."""
+        return [
+            space._replace(log_weight=space.log_weight - self.log_sharing)
+            for space in spaces
+        ]
+
+    def _evaluate(
+        self,
+        columns: Sequence[int],
+        parts: Sequence[Part],
+        only: set[int] | None = None,
+    ) -> dict[int, Evaluated]:
+        """Evaluate everything given some parts under several models of the noise."""
+        context, local = join(self.problem, parts), []
+        if only is None or self.outside in only:
+            extended = self.problem.with_columns(context.offset, context.columns)
+            local = likeliest_members(extended, self.families, self.outside)
+            local = self._sharing(local)
+        noises, evaluate = self.table.noises, self.selection.evaluate
+        return {
+            column: evaluate(noises[column], context, local, only) for column in columns
+        }
+
+    def _alone(self, columns: Sequence[int]) -> None:
+        """Enter none and each component alone."""
+        table = self.table
+        for column, found in self._evaluate(columns, []).items():
+            self.found_alone[column] = found
+            table.put((), column, found.none, list)
+            for k, value in enumerate(found.totals()):
+                if np.isfinite(value):
+                    name = (table.names[k],)
+                    parts = partial(_likeliest, found, k)
+                    table.put(name, column, value, parts)
+
+    def fitted_correlations(self) -> None:
+        """Enter everything alone with the correlations that two hypotheses leave.
+
+        In many rows a correlation between two of the grid fits much better than both.
+        """
+        table, problem = self.table, self.problem
+        largest = table.noises[-1].correlation
+        for key in dict.fromkeys([(), table.ranked()[0]]):
+            fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
+            more = correlated_noise(problem, problem.y - fit.reading, largest)
+            known = np.array([noise.correlation for noise in table.noises])
+            if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
+                table.add_noises([more])
+                self._alone([len(table.noises) - 1])
+
+    def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
+        """Enter everything alone under the library's models of the noise."""
+        table, problem = self.table, self.problem
+        likeliest = int(np.argmax(table.noise_probabilities()))
+        correlation = table.noises[likeliest].correlation
+        more = growing_noise(problem, correlation) if GROWING in library else []
+        if OUTLIERS in library:
+            for key in dict.fromkeys([(), table.ranked()[0]]):
+                parts = table.parts[key]
+
+                def fitted(weight, parts=parts):
+                    equal = NoiseModel("", weight, 0.0, 0.0)
+                    return posterior(problem, equal, parts).reading
+
+                more += outliers(problem, correlation, fitted)
+        count = len(table.noises)
+        table.add_noises(more)
+        self._alone(range(count, len(table.noises)))
+
+    def pairs(self) -> None:
+        """Enter pairs, and components and pairs with a remainder."""
+        table, chance = self.table, self.table.noise_probabilities()
+        columns = np.argsort(-chance)[:_MOST_NOISES]
+        columns = [int(k) for k in columns if chance[k] >= _LEAST_NOISE]
+        leading = table.ranked(1)[:_CONTEXTS]
+        if (OUTSIDE,) in table.log_evidence and (OUTSIDE,) not in leading:
+            leading[-1] = (OUTSIDE,)
+        if (OUTSIDE,) in table.parts:
+            self._grow((OUTSIDE,), columns)
+        for key in leading:
+            self._extend(table.parts[key], columns)
+        for _ in range(_TIMES):
+            for key in table.ranked(2)[:_REFINED]:
+                self._refine(key, columns[:1])
+        for key in table.ranked(2)[:_REFINED]:
+            if OUTSIDE not in key:
+                self._extend(table.parts[key], columns, {self.outside})
+        extended = [k for k in table.ranked() if OUTSIDE in k and len(k) > 1]
+        for key in extended[:_REFINED]:
+            self._grow(key, columns[:1])
+
+    def _grow(self, key: Names, columns: Sequence[int]) -> None:
+        """Add kernels to the remainder of a hypothesis while the evidence grows."""
+        table, outside = self.table, self.outside
+        for _ in range(_MOST_KERNELS - 1):
+            parts, before = table.parts[key], table.log_evidence[key].max()
+            others = [part for part in parts if part.component != outside]
+            own = [part for part in parts if part.component == outside]
+            for column, found in self._evaluate(columns, parts, {outside}).items():
+                more = [*others, merged([*own, found.likeliest(outside)])]
+                gain = found.totals()[outside] - found.none + np.log(_ONE_MORE)
+                gain += self._signs(column, parts, more)
+                value = table.log_evidence[key][column] + gain
+                table.put(key, column, value, lambda more=more: more)
+            if table.log_evidence[key].max() <= before:
+                return
+
+    def _refine(self, key: Names, columns: Sequence[int]) -> None:
+        """Evaluate each member of a pair given the best item of the other one."""
+        members = {self.table.names.index(name) for name in key}
+        for part in [*self.table.parts[key]]:
+            if part.component != self.outside:
+                self._extend([part], columns, members - {part.component})
+
+    def _extend(
+        self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
+    ) -> None:
+        """Enter everything, or some components, given some parts.
+
+        These are one component, or a pair whose evidence is in the table.
+        """
+        table = self.table
+        key = tuple(sorted(table.names[part.component] for part in parts))
+        for column, found in self._evaluate(columns, parts, only).items():
+            gain = found.totals() - found.none
+            start = table.log_evidence[key][column]
+            if len(parts) == 1 and parts[0].place is not None:
+                start = self.found_alone[column].of_part(parts[0])
+            gain[[part.component for part in parts]] = -np.inf
+            for k in np.flatnonzero(gain > gain.max() - _HOPELESS):
+                names = {*key, table.names[k]}
+                if len(names - {OUTSIDE}) > 2:
+                    continue
+                both = [*parts, found.likeliest(int(k))]
+                value = start + gain[k] + self._signs(column, parts, both)
+                table.put(tuple(names), column, value, lambda both=both: both)
+
+    def _signs(self, column: int, parts: list[Part], more: list[Part]) -> float:
+        """Return the change of the log probability of signs, which is no gain."""
+        before, after = (
+            log_sign_probability(self.problem, self.table.noises[column], each)
+            for each in (parts, more)
+        )
+        return min(after - before, 0.0)

@@ -48,8 +48,7 @@ class EvidenceTable:
     def posterior(self, temperature: float = 1.0) -> dict[Names, np.ndarray]:
         """Return the probability of each hypothesis and model of the noise.
 
-        Args:
-            temperature: by which log evidences of hypotheses are divided.
+        Log evidences of hypotheses are divided by the temperature.
         """
         table = np.stack([*self.log_evidence.values()])
         prior = np.array([self.log_prior(key) for key in self.log_evidence])
@@ -59,11 +58,7 @@ class EvidenceTable:
         return dict(zip(self.log_evidence, joint / joint.sum(), strict=True))
 
     def ranked(self, size: int | None = None) -> list[Names]:
-        """Return hypotheses, the most probable first.
-
-        Args:
-            size: only those of so many components.
-        """
+        """Return hypotheses, or those of so many components, likeliest first."""
         chance = {
             key: float(each.sum())
             for key, each in self.posterior().items()
@@ -84,11 +79,7 @@ class EvidenceTable:
     ) -> None:
         """Enter an evidence; of several lower bounds the largest counts.
 
-        Args:
-            names: of the components.
-            column: index of the model of the noise.
-            value: the log evidence.
-            parts: returns the components, where this is the largest evidence so far.
+        `parts` returns the components, where this is the largest evidence so far.
         """
         key = tuple(sorted(names))
         none = np.full(len(self.noises), -np.inf)

@@ -57,16 +57,9 @@ def _apply(stage: Stage, effects: Sequence[Effect], signal, rows: Rows):
 def predict_reading(
     base: Base, effects: Sequence[Effect], records: Records, reading: Reading
 ) -> tuple[Float[Array, " n"], Noise]:
-    """Compute the mean reading and the noise of each row.
+    """Compute the mean reading [N] and the noise of each row, before any rounding.
 
-    Args:
-        base: parameters of the force model.
-        effects: any set of effects.
-        records: rows in the order they were taken.
-        reading: how the rig reads.
-
-    Returns:
-        Mean force as read [N], and its noise before any rounding.
+    Records are in the order they were taken; effects may be any set.
     """
     rise = records.temperature - reading.reference_temperature
     stiffness = base.stiffness * (1.0 - base.alpha * rise)
@@ -84,10 +77,10 @@ def predict_reading(
 
 
 def linear_columns(records: Records, reading: Reading) -> Float[Array, "n 4"]:
-    """Return the columns in which the chain without effects is linear.
+    """Return the columns in which the chain without effects is linear: ω, ωΔT, 1, ΔT.
 
     mean = s ρ·ω − s α ρ·ω ΔT + (b − s ρ ω₀) + s α ρ ω₀·ΔT, with ρ the radial
-    displacement per displacement read and s the stiffness: columns ω, ωΔT, 1, ΔT.
+    displacement per displacement read and s the stiffness.
     """
     rise = records.temperature - reading.reference_temperature
     one = jnp.ones_like(rise)
@@ -128,7 +121,7 @@ def force(
         modulus: Young's modulus E₀ at the reference temperature [MPa].
         influence: K under `theory` [-].
         deformation: radial ω [mm].
-        theory: ring, cup or article.
+        theory: a name of `THEORIES`.
         alpha: relative loss of modulus per kelvin [1/K].
         temperature_rise: ΔT = T − T_ref [K].
         deformation_offset: ω₀ [mm].

@@ -1,13 +1,12 @@
 """The flexspline as an oscillator: m ÿ + c ẏ + g(y, ẏ) = F(t).
 
-The coordinate y is the deformation per millimetre *as read*, measured from the
-unloaded gear, and F is the load that acts on the gear. The restoring force g is that
-of the calibrated chain with its instantaneous effects; effects with memory, and those
-of gauges and sensors, are left out.
+The coordinate y is the deformation *as read*, measured from the unloaded gear, and F is
+the load that acts on the gear. The restoring force g is that of the calibrated chain
+with its instantaneous effects; those with memory and of gauges are left out.
 
 Dry friction is a contact that sticks elastically and slips at its full force, as in the
-effect `hysteresis`: its state is a displacement u, ideal friction the limit of a stiff
-contact. No speed enters, so slow motions stick and slip as fast ones do.
+effect `hysteresis`: its state is a displacement u. No speed enters, so slow motions
+stick and slip as fast ones do.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,22 +42,18 @@ def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Sc
     """Return the mass that a load moves on a bare ring [N·s²/mm], as read.
 
     The ring of mass M = 2πRδLρ bends inextensibly as under its two static loads,
-    w = Σ aₙ cos nφ with aₙ = ω/((n²−1)² S), n = 2, 4, …; from v′ + w = 0 follows
-    v = −Σ (aₙ/n) sin nφ. Its kinetic energy ½ρδLR ∫(ẇ² + v̇²)dφ is
-    (M/4) Σ ȧₙ² (1 + 1/n²), shared by two loads that each do the work F δω:
-
-        m = (M/4) Σ (1 + 1/n²)/(n²−1)⁴ / S² = 0.283 M  per radial displacement.
-
-    Read as a diameter between a fixed and a moving platen, d = 2ω, the centre of the
-    ring moves too: m per displacement read is then m/2 + M/4.
+    w = Σ aₙ cos nφ with aₙ = ω/((n²−1)² S), n = 2, 4, …, and v′ = −w. Its kinetic
+    energy (M/4) Σ ȧₙ² (1 + 1/n²) is shared by two loads that each do the work F δω:
+    m = (M/4) Σ (1 + 1/n²)/(n²−1)⁴ / S² = 0.283 M per radial displacement. Read as a
+    diameter between a fixed and a moving platen the centre of the ring moves too: m per
+    displacement read is then m/2 + M/4.
 
     Args:
         geometry: sizes [mm].
         density: ρ [N·s²/mm⁴].
         radial_per_read: 1 for a radial reading, ½ for a diametral one.
 
-    Source:
-        Rayleigh's principle with the static shape of the loaded ring.
+    Source: Rayleigh's principle with the static shape of the loaded ring.
     """
     g = geometry
     whole = 2.0 * jnp.pi * g.radius * g.wall_thickness * g.length * density
@@ -66,9 +61,7 @@ def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Sc
     n = 2.0 * jnp.arange(1, 60)
     shape = jnp.sum((1.0 + n**-2) / (n**2 - 1.0) ** 4) / RING_SERIES**2
     radial = 0.25 * whole * shape
-    if radial_per_read == 1.0:
-        return radial
-    return radial / 2.0 + whole / 4.0
+    return radial if radial_per_read == 1.0 else radial / 2.0 + whole / 4.0
 
 
 class Oscillator(eqx.Module):
@@ -109,21 +102,17 @@ class Oscillator(eqx.Module):
     ) -> Float[Array, ""]:
         """Return g, the force of the gear against its deformation [N].
 
-        Args:
-            deformation: y [mm].
-            speed: ẏ [mm/s].
-            sense: share of the dry friction that acts, from −1 to 1.
+        `sense` is the share of the dry friction that acts, from −1 to 1.
         """
-        row, zero = jnp.reshape(deformation, (1,)), jnp.zeros(1)
-        label = jnp.zeros(1, int)
+        zero, label = jnp.zeros(1), jnp.zeros(1, int)
         records = Records(
-            deformation=row,
+            deformation=zero + deformation,
             temperature=zero + self.temperature,
             time=zero,
             angle=zero,
             direction=zero + sense,
             sense=zero + sense,
-            rate=jnp.reshape(speed, (1,)),
+            rate=zero + speed,
             run=label,
             specimen=label,
             force=zero,
@@ -181,14 +170,9 @@ def integrate(
     """Integrate the equation of motion from rest and zero deformation.
 
     Time is counted in radians of the natural frequency and speed in the deformation
-    that goes with it, so that one tolerance serves gears of every size.
-
-    Args:
-        oscillator: one set of parameters.
-        force: over time.
-        times: increasing [s]; motion begins at the first.
-        reach: deformation at which the integration ends [mm]: a gear that gives way
-            there accelerates without end.
+    that goes with it, so that one tolerance serves gears of every size. Motion begins
+    at the first of the increasing times [s] and ends at a deformation of `reach` [mm]:
+    a gear that gives way there accelerates without end.
     """
     # Half a second, which only motion needs.
     import diffrax
@@ -254,9 +238,7 @@ def _largest(times, deformation, speed) -> Float[Array, ""]:
 def _slip(oscillator: Oscillator, size: Scalar) -> Float[Array, ""]:
     """Return the movement at which a contact at rest slips [mm].
 
-    Args:
-        oscillator: one set of parameters.
-        size: static deformation under the largest force [mm].
+    `size` is the static deformation under the largest force.
     """
     stuck, free = (oscillator.restoring(size, 0.0, sense) for sense in (1.0, 0.0))
     slip = STUCK * (stuck - free) / oscillator.stiffness

@@ -125,13 +125,10 @@ class Effect(eqx.Module, ABC):
     def apply(self, signal: Any, rows: Rows) -> Any:
         """Return the signal of this effect's stage, changed by the effect.
 
-        A row may depend on itself and on rows before it, never on the number of rows:
-        copies of the last one may follow, and must change nothing before them.
-
-        Args:
-            signal: radial deformation [mm] on the deformation stage, force [N] on
-                the force and sensor stages, `Noise` on the noise stage.
-            rows: the covariates and earlier stages.
+        The signal is the radial deformation [mm] on the deformation stage, the force
+        [N] on the force and sensor stages, `Noise` on the noise stage. A row may depend
+        on itself and on rows before it, never on the number of rows: copies of the last
+        one may follow, and must change nothing before them.
         """
 
 

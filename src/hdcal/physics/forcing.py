@@ -31,11 +31,7 @@ class Forcing(eqx.Module, ABC):
 
 
 class Step(Forcing):
-    """F = A from t = 0 on.
-
-    Attributes:
-        amplitude: A [N].
-    """
+    """F = A from t = 0 on; the amplitude is A [N]."""
 
     amplitude: Scalar
 
@@ -80,12 +76,7 @@ class Chirp(Forcing):
 
 
 class SampledForce(Forcing):
-    """A sampled force: linear between the rows, constant beyond them.
-
-    Attributes:
-        time: increasing [s], shape (n,).
-        force: [N], shape (n,).
-    """
+    """A force [N] at increasing times [s]: linear between them, constant beyond."""
 
     time: Float[Array, " n"]
     force: Float[Array, " n"]

@@ -7,45 +7,6 @@ from jaxtyping import Bool, Float, Int
 from hdcal.data.records import Array
 
 
-def leaky_sum(
-    decay: Float[Array, " n"], gain: Float[Array, " n"]
-) -> Float[Array, " n"]:
-    """Return y_i = decay_i · y_(i−1) + gain_i with y before the first row zero.
-
-    A decay of zero restarts the sum.
-    """
-
-    def advance(last, row):
-        now = row[0] * last + row[1]
-        return now, now
-
-    return jax.lax.scan(advance, jnp.zeros(()), (decay, gain))[1]
-
-
-def play(
-    deformation: Float[Array, " n"],
-    half_width: Float[Array, ""] | float,
-    restart: Bool[Array, " n"],
-) -> Float[Array, " n"]:
-    """Return what follows a deformation with play: it moves only when pushed.
-
-    y_i = max(x_i − r, min(x_i + r, y_(i−1))), y = 0 before the first row.
-
-    Args:
-        deformation: x [mm], in the order in which it was passed through.
-        half_width: r [mm].
-        restart: rows before which y is zero again.
-    """
-
-    def advance(last, row):
-        pushed, anew = row
-        last = jnp.where(anew, 0.0, last)
-        now = jnp.maximum(pushed - half_width, jnp.minimum(pushed + half_width, last))
-        return now, now
-
-    return jax.lax.scan(advance, jnp.zeros(()), (deformation, restart))[1]
-
-
 def by_label(label: Int[Array, " n"]) -> tuple[Int[Array, " n"], Bool[Array, " n"]]:
     """Return the rows label after label, and which of those start a label.
 
@@ -66,13 +27,7 @@ def fading(
 
     The signal is taken as linear in time between rows, for which the step is exact:
     y ← y e^(−λΔt) + Δs (1 − e^(−λΔt))/(λΔt). Before its first row a run has climbed
-    from zero since the reset at t = 0.
-
-    Args:
-        signal: in any unit.
-        time: since the reset of the row's run [s].
-        run: index of the mounting.
-        rate: λ, one over the time constant [1/s].
+    from zero since the reset at t = 0. The rate λ is one over the time constant [1/s].
     """
     order, starts = by_label(run)
     time, signal = jnp.asarray(time)[order], jnp.asarray(signal)[order]
@@ -84,33 +39,49 @@ def fading(
     safe = jnp.where(small, 1.0, loss)
     kept = jnp.where(small, 1.0 - 0.5 * loss, -jnp.expm1(-safe) / safe)
     decay = jnp.where(starts, 0.0, jnp.exp(-loss))
-    return jnp.zeros_like(signal).at[order].set(leaky_sum(decay, gain * kept))
+
+    def advance(last, row):
+        now = row[0] * last + row[1]
+        return now, now
+
+    found = jax.lax.scan(advance, jnp.zeros(()), (decay, gain * kept))[1]
+    return jnp.zeros_like(signal).at[order].set(found)
+
+
+def play(
+    deformation: Float[Array, " n"],
+    label: Int[Array, " n"],
+    half_width: Float[Array, " c"],
+) -> Float[Array, "c n"]:
+    """Return what follows a deformation with play: it moves only when pushed.
+
+    y ← max(ω − r, min(ω + r, y)) for each half-width r [mm]. Each run, or specimen,
+    starts from y = 0.
+    """
+    order, starts = by_label(label)
+
+    def advance(last, row):
+        pushed, anew = row
+        last = jnp.where(anew, 0.0, last)
+        now = jnp.maximum(pushed - half_width, jnp.minimum(pushed + half_width, last))
+        return now, now
+
+    rows = (jnp.asarray(deformation)[order], starts)
+    found = jax.lax.scan(advance, jnp.zeros_like(half_width), rows)[1].T
+    return jnp.zeros_like(found).at[:, order].set(found)
 
 
 def stop_cells(
-    deformation: Float[Array, " n"], run: Int[Array, " n"], reach: Float[Array, " c"]
+    deformation: Float[Array, " n"],
+    label: Int[Array, " n"],
+    reach: Float[Array, " c"],
 ) -> Float[Array, "c n"]:
     """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
 
-    Every run starts from rest: its first row is a move from ω = 0.
-
-    Args:
-        deformation: ω in the order it was taken [mm].
-        run: index of the mounting.
-        reach: deformation from rest to slip, cell by cell [mm].
+    What a play of this half-width leaves of the deformation. Each run, or specimen,
+    starts from rest: its first row is a move from ω = 0.
     """
-    order, starts = by_label(run)
-    own = jnp.asarray(deformation)[order]
-    move = jnp.where(starts, own, jnp.diff(own, prepend=0.0))
-
-    def advance(last, row):
-        kept, step = row
-        now = jnp.clip(kept * last + step / reach, -1.0, 1.0)
-        return now, now
-
-    rows = (jnp.where(starts, 0.0, 1.0), move)
-    states = jax.lax.scan(advance, jnp.zeros_like(reach), rows)[1].T
-    return jnp.zeros_like(states).at[:, order].set(states)
+    return (deformation - play(deformation, label, reach)) / reach[:, None]
 
 
 def load_cycle(
@@ -118,13 +89,9 @@ def load_cycle(
 ) -> Float[Array, " n"]:
     """Return the number of the load cycle that each specimen is in, from 1.
 
-    A cycle begins with each run, and within it wherever the movement turns back to
-    the sense in which the run began. Rows count in the order of the file.
-
-    Args:
-        sense: sign of the last movement.
-        run: index of the mounting; a run belongs to one specimen.
-        specimen: index of the gear.
+    A cycle begins with each run, and within it wherever the movement turns back to the
+    sense in which the run began. Rows count in the order of the file; a run belongs to
+    one specimen.
     """
     order, starts = by_label(run)
     own = jnp.asarray(sense)[order]

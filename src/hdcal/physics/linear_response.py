@@ -92,11 +92,8 @@ def linear_response(
 ) -> Float[Array, "n 2"]:
     """Return deformation [mm] and speed [mm/s] at the rows.
 
-    Args:
-        gear: mass, damping and stiffness.
-        time: increasing, in steps of any size [s].
-        force: at the rows [N], linear between them.
-        start: deformation and speed at the first row.
+    Times [s] increase in steps of any size, the force [N] is linear between the rows,
+    and `start` is deformation and speed at the first row.
     """
 
     # A gradient recomputes each step, which takes less memory than to keep it.
@@ -122,15 +119,9 @@ def fit_linear(
 ) -> tuple[Float[Array, ""], Float[Array, "4"]]:
     """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and offset of the best fit.
 
-    At a given frequency and damping ratio the readings are linear in these.
-
-    Args:
-        place: natural frequency [Hz] and damping ratio.
-        time: increasing [s].
-        force: at the rows [N], linear between them.
-        read: deformation [mm].
-        weight: of each row, 0 or 1.
-        stiffness: of all steps, or of each, over its mean k.
+    At a given place, natural frequency [Hz] and damping ratio, the deformations [mm]
+    that are read are linear in these. The force is linear between the rows, the weight
+    of a row 0 or 1, and the stiffness of all steps, or of each, relative to its mean.
     """
     # A mass of one over ω² has a mean stiffness of one.
     pace = 2.0 * jnp.pi * place[0]

@@ -22,17 +22,8 @@ RING_SERIES = (jnp.pi**2 - 8.0) / 16.0
 def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of an inextensible ring: k = π E L δ³ / (24 R³ S).
 
-    Args:
-        geometry: sizes [mm].
-        modulus: Young's modulus E [MPa].
-
-    Returns:
-        Force per radial displacement [N/mm].
-
-    Source:
-        Minimised bending energy of a ring on a diameter; the same as
-        Castigliano's diameter change 0.14878 F R³/(E I) (Timoshenko, Strength
-        of Materials).
+    Source: minimised bending energy of a ring on a diameter; the same as Castigliano's
+    diameter change 0.14878 F R³/(E I) (Timoshenko, Strength of Materials).
     """
     slenderness = geometry.wall_thickness / geometry.radius
     return jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
@@ -48,16 +39,8 @@ def cup(geometry: Geometry, modulus: Scalar) -> Scalar:
     The load acts at height c from the base, where the wall can warp freely. The
     series is summed in closed form by partial fractions in n².
 
-    Args:
-        geometry: sizes [mm].
-        modulus: Young's modulus E [MPa].
-
-    Returns:
-        Force per radial displacement at the load [N/mm].
-
-    Source:
-        Rayleigh's inextensional deformation of a cylinder (Theory of Sound, ch.
-        Xa), displacement growing linearly from the base.
+    Source: Rayleigh's inextensional deformation of a cylinder (Theory of Sound, ch.
+    Xa), displacement growing linearly from the base.
     """
     g = geometry
     bending = modulus * g.wall_thickness**3 / (12.0 * (1.0 - g.poisson**2))
@@ -77,17 +60,10 @@ def article(geometry: Geometry, modulus: Scalar) -> Scalar:
     k = 1625.19 N/mm · (E/210 GPa) (δ/0.68 mm)³ (40 mm/R)³.
 
     The number follows from no combination of the article's inputs; it is kept so
-    that the article's influence coefficient K ≈ 0.13 can be compared.
+    that the article's influence coefficient K ≈ 0.13 can be compared. The length is not
+    used, as in the article.
 
-    Args:
-        geometry: sizes [mm]; the length is not used, as in the article.
-        modulus: Young's modulus E [MPa].
-
-    Returns:
-        Force per radial displacement [N/mm].
-
-    Source:
-        "Study on Flexible Gear Deformation in Harmonic Drive Gear", slope K₁.
+    Source: "Study on Flexible Gear Deformation in Harmonic Drive Gear", slope K₁.
     """
     return (
         1625.19
@@ -101,17 +77,9 @@ def spring(_geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness that K multiplies where no sizes are known: k = E · 1 mm.
 
     With E fixed at 1 MPa, as a gear file with this theory has it, K is the stiffness
-    itself in N/mm.
+    itself in N/mm. Sizes may be NaN.
 
-    Args:
-        _geometry: not used; its sizes may be NaN.
-        modulus: 1 MPa, times what it loses with the temperature.
-
-    Returns:
-        Force per radial displacement [N/mm].
-
-    Source:
-        Hooke's law.
+    Source: Hooke's law.
     """
     return modulus * 1.0
 
@@ -122,3 +90,19 @@ THEORIES: dict[str, Stiffness] = {
     "article": article,
     "spring": spring,
 }
+
+
+def peak_stress(geometry: Geometry, modulus: Scalar, deformation: Scalar) -> Scalar:
+    """Return the largest hoop bending stress of a ring: σ = E δ ω / (4 S R²) [MPa].
+
+    It acts in the outer surface under the load. The shape is imposed, so that it
+    follows from the radial displacement ω [mm] and not from the force: what stiffens a
+    real gear by K (teeth, closed end) does not change the curvature of its wall. The
+    wall is smooth and free to contract along its axis; held, the stress is larger by
+    1/(1 − ν²). Notches at teeth are not in it.
+
+    Source: Castigliano's ring, moment 0.318 F R under the load (Timoshenko, Strength
+    of Materials).
+    """
+    curvature = 0.5 * deformation / RING_SERIES / geometry.radius**2
+    return 0.5 * modulus * geometry.wall_thickness * curvature

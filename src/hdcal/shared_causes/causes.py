@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from hdcal.calibration.known_effects import check_effect_priors
-from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
 from hdcal.data.case import Case, require_force
 from hdcal.data.measurements.bad_gears import cause as fault
@@ -35,7 +34,6 @@ _COUNTS = 1.0
 _CHAINS, _DRAWS, _MOST_DRAWS = 4, 1500, 12_000
 # Differences between runs and between gears are a question to the fleet.
 _OF_FLEETS = {"runs", "specimens"}
-_LOST = "start again"
 # Probability of the set of causes of a gear.
 _CREDIBLE = 0.9
 # Log odds that are substantial (Jeffreys, Theory of Probability, 1961).
@@ -49,7 +47,6 @@ def causes(
     columns: Mapping[str, str] | None = None,
     library: Mapping[str, type[Effect]] | None = None,
     jobs: int = 1,
-    scheduler: str | None = None,
     skip_bad: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -67,7 +64,6 @@ def causes(
         columns: as in `read_case`.
         library: effects to consider, by name; by default all of them.
         jobs: processes that share the gears.
-        scheduler: address of a Dask scheduler, whose workers share the gears instead.
         skip_bad: leave out gears with a wrong row, with too few readings, or whose
             evidence fails.
         seed: of all random numbers.
@@ -86,16 +82,12 @@ def causes(
     check_effect_priors(case, {**EFFECTS, **effects})
     gears, left_out = usable_gears(case, skip_bad=skip_bad)
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
-    tasks = [(index, each, effects, seed) for index, each in enumerate(gears)]
-    if scheduler is None:
-        weighed = run_all(weigh_gear, tasks, jobs, progress)
-    else:
-        weighed = list(completed_on_cluster(weigh_gear, iter(tasks), scheduler, _LOST))
-    found = dict(weighed)
+    tasks = [(each, effects, seed) for each in gears]
     labels = [each.specimen_labels[0] for each in gears]
-    failed = {labels[k]: w for k, w in found.items() if isinstance(w, Finding)}
+    found = dict(zip(labels, run_all(weigh_gear, tasks, jobs, progress), strict=True))
+    failed = {gear: w for gear, w in found.items() if isinstance(w, Finding)}
     gears = without_bad(gears, failed, skip_bad=skip_bad)
-    weights = [found[k] for k in range(len(labels)) if labels[k] not in failed]
+    weights = [w for gear, w in found.items() if gear not in failed]
     return _together(case, gears, weights, {**left_out, **failed}, [*effects], seed)
 
 
@@ -122,7 +114,20 @@ def _together(
     sets = [_credible_set(names, row, confounded) for row in drawn.chance]
     why = {gear: fault(finding) for gear, finding in left_out.items()}
     words = [left_out_words(left_out, len(sets) + len(why))] if why else []
-    used = _rows(gears, names, sets, drawn.chance, alone, failed=bool(reasons))
+    used = [
+        GearCauses(
+            gear=each.specimen_labels[0],
+            lot=each.lots[0] if each.lots else None,
+            rows=len(each.records.force),
+            causes=" / ".join(sets[k]),
+            probability=float(drawn.chance[k].max()),
+            probability_none=float(drawn.chance[k, names.index(NONE)]),
+            alone=names[int(alone[k].argmax())],
+            probability_alone=float(alone[k].max()),
+            status="failed" if reasons else "ok",
+        )
+        for k, each in enumerate(gears)
+    ]
     unused = [GearCauses(gear=g, status=f"left out: {w}") for g, w in why.items()]
     return FleetCauses(
         part="part" if case.gear.theory == SPRING else "gear",
@@ -143,32 +148,6 @@ def _together(
         checks=checks,
         name=case.name,
     )
-
-
-def _rows(
-    gears: Sequence[Case],
-    names: Sequence[str],
-    sets: Sequence[tuple[str, ...]],
-    chance: np.ndarray,
-    alone: np.ndarray,
-    *,
-    failed: bool,
-) -> list[GearCauses]:
-    """Return the rows of gears.csv."""
-    return [
-        GearCauses(
-            gear=each.specimen_labels[0],
-            lot=each.lots[0] if each.lots else None,
-            rows=len(each.records.force),
-            causes=" / ".join(sets[k]),
-            probability=float(chance[k].max()),
-            probability_none=float(chance[k, names.index(NONE)]),
-            alone=names[int(alone[k].argmax())],
-            probability_alone=float(alone[k].max()),
-            status="failed" if failed else "ok",
-        )
-        for k, each in enumerate(gears)
-    ]
 
 
 def _tables(

@@ -24,19 +24,12 @@ from hdcal.cli.options import (
     show_default=True,
     help="Diagnose the gears in so many processes.",
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Diagnose the gears on the workers of this Dask scheduler.",
-)
 @skip_bad_option
 @seed_option
 @folder_options("Write the result to DIR [default: NAME-causes].")
 @json_option
 @click.pass_obj
-def causes(
-    console: Console, out, force, seed, library, jobs, scheduler, skip_bad, **given
-):
+def causes(console: Console, out, force, seed, library, jobs, skip_bad, **given):
     """Find the effects of the gears in DATA, and the frequency of each.
 
     DATA has a column `specimen`, gear or serial, or is a folder with a file, or a
@@ -65,7 +58,7 @@ def causes(
     assert case is not None and effects is not None
     from hdcal.shared_causes.causes import causes as shared_causes
 
-    asked = {"jobs": jobs, "scheduler": scheduler, "skip_bad": skip_bad, "seed": seed}
+    asked = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed}
     with progress_bar("weighing") as progress:
         found = shared_causes(case, library=effects, progress=progress, **asked)
     return console.show(found, tables={"gears.csv": found.to_frame()})

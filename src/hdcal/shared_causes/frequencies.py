@@ -42,14 +42,14 @@ def sample_frequencies(
     chains: int = 4,
     draws: int = 1500,
 ) -> Frequencies:
-    """Draw frequencies and causes.
+    """Draw frequencies and causes in independent chains.
 
     Args:
         log_likelihood: of each gear's readings by cause, up to a constant of the gear,
             shape (g, k).
         counts: of the Dirichlet prior, in gears, shape (k,).
         rng: source of randomness.
-        chains: number of independent chains.
+        chains: number of chains.
         draws: of each chain.
     """
     gears, causes = log_likelihood.shape

@@ -36,29 +36,23 @@ class Weight(NamedTuple):
 # Thousands of small systems are solved, over which threads only wait for each other.
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def weigh_gear(
-    index: int, gear: Case, library: Mapping[str, type[Effect]], seed: int
-) -> tuple[int, dict[str, Weight] | Finding]:
+    gear: Case, library: Mapping[str, type[Effect]], seed: int
+) -> dict[str, Weight] | Finding:
     """Return the evidence of each cause, or why there is none.
 
     The force offsets of runs are integrated out in every hypothesis.
-
-    Args:
-        index: of the gear; returned with the evidence.
-        gear: its rows.
-        library: effects to consider, by name.
-        seed: of the draws.
     """
     remedy = "Leave the gear out, or diagnose it alone"
     try:
         searched = search(gear, library, free_runs=True)
         found = by_cause(searched, np.random.default_rng(seed))
     except InputError as error:
-        return index, error.findings[0]
+        return error.findings[0]
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        return index, Finding(gear.name, f"its evidence failed ({error})", remedy)
+        return Finding(gear.name, f"its evidence failed ({error})", remedy)
     if not np.all(np.isfinite([*found.values()])):
-        return index, Finding(gear.name, "its evidence is not finite", remedy)
-    return index, found
+        return Finding(gear.name, "its evidence is not finite", remedy)
+    return found
 
 
 def by_cause(searched: Searched, rng: np.random.Generator) -> dict[str, Weight]:
@@ -97,10 +91,7 @@ def _shares(
 ) -> dict[str, tuple[float, float]]:
     """Return each cause's prior share of a hypothesis, and the readings' factor on it.
 
-    Args:
-        searched: hypotheses of the gear.
-        key: components of the hypothesis.
-        rng: source of randomness; None leaves the shares at their prior.
+    Without a source of randomness the shares stay at their prior.
     """
     effects = [name for name in key if name != OUTSIDE]
     if OUTSIDE not in key or not effects:

@@ -24,13 +24,7 @@ _FEWEST_LEFT = 8
 
 
 def read_gears(data: Any, gear: Any = None, **how: Any) -> Case:
-    """Return the readings of many gears.
-
-    Args:
-        data: a case; a table or file as `read_case` takes it, with a column `specimen`;
-            or a folder with a file, or a folder, for each gear.
-        gear: as in `read_case`.
-        how: further arguments of `read_case`, or of `read_gear_folder`.
+    """Return the readings of many gears, as `causes` takes them.
 
     Raises:
         InputError: holds everything that is wrong with the data.
@@ -43,14 +37,9 @@ def read_gears(data: Any, gear: Any = None, **how: Any) -> Case:
 
 
 def usable_gears(case: Case, *, skip_bad: bool = False) -> tuple[list[Case], dict]:
-    """Return the gears whose readings can show a cause.
+    """Return a case for each gear whose readings can show a cause.
 
-    Args:
-        case: readings of all gears.
-        skip_bad: leave the other gears out.
-
-    Returns:
-        A case for each gear, and the finding on each gear that is left out.
+    And the finding on each gear that is left out, where bad ones may be.
 
     Raises:
         InputError: too few gears are left, or a gear cannot be used.

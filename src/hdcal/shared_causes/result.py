@@ -48,9 +48,6 @@ class GearCauses(Item):
     """One gear: a row of gears.csv.
 
     Attributes:
-        gear: its label.
-        lot: empty if lots are not stated.
-        rows: of the gear.
         causes: the fewest with a probability of 0.9, the most probable first.
         probability: of the most probable cause, given all gears.
         probability_none: that the gear has no effect.
@@ -80,21 +77,13 @@ class FleetCauses(Result):
     """Result of `hdcal causes`; summary.json.
 
     Attributes:
-        gears: number of gears.
-        rows: number of their rows.
         left_out: reason for each gear that is in none of the numbers.
         causes: that were considered, the most frequent first.
         not_shown: effects of the library without a prediction for any gear.
         confounded: causes that one gear alone does not separate from something outside
             the library, which many gears do not separate better.
-        notes: from reading.
-        seed: of the random numbers.
-        draws: of the sampler.
-        versions: of the packages.
-        data_sha256: of the data.
         each_gear: the rows of gears.csv.
         checks: of the sampler.
-        name: of the case.
     """
 
     template = "shared_causes/report.md.j2"

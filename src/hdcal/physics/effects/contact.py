@@ -15,8 +15,6 @@ class SeatingSlack(Effect, stage="deformation", family="curve up", instantaneous
     Play is taken up before the gear carries load. For ω > 0 this is max(0, ω − ω_c).
     The clip is x (1 + x⁸)^(−1/8): smooth, and a third of a clearance away from the
     corner within 1.2 % of a clearance of it.
-
-    Source: handbook (play of a bolted or seated joint).
     """
 
     clearance: Scalar = parameter(
@@ -67,8 +65,6 @@ class ContactOnset(Effect, stage="force", family="curve up", instantaneous=True)
     """F → F + k₂ max(0, |ω| − ω_c) sign ω, k₂ = r k, with a rounded corner.
 
     A second contact closes at some deformation and stiffens the gear.
-
-    Source: handbook (bilinear spring of a stop that closes a gap).
     """
 
     ratio: Scalar = parameter(

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.physics.effect import Effect, PerRow, Rows, parameter
-from hdcal.physics.history import by_label, play, stop_cells
+from hdcal.physics.history import play, stop_cells
 from hdcal.physics.theory import Scalar
 
 
@@ -28,10 +28,8 @@ class PlasticYield(Effect, stage="force", family="loop", needs=("unloading",)):
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
         # Specimen after specimen, each from its first row, whatever the run.
-        order, starts = by_label(rows.records.specimen)
-        deformation = jnp.asarray(rows.deformation)[order]
-        plastic = play(deformation, self.yield_deformation, starts)
-        plastic = jnp.zeros_like(signal).at[order].set(plastic)
+        half_width = jnp.reshape(self.yield_deformation, (1,))
+        (plastic,) = play(rows.deformation, rows.records.specimen, half_width)
         return signal - self.softening * rows.stiffness * plastic
 
 
@@ -41,8 +39,6 @@ class CoulombFriction(
     """F → F + F_c s, with s the sign of the last movement; a hold keeps it.
 
     Dry friction of guides and contacts: a force opposing the motion.
-
-    Source: handbook (Coulomb's law of dry friction).
     """
 
     force: Scalar = parameter(
@@ -59,9 +55,6 @@ class LoadFriction(
     """F → F + μ |k ω| s, with s the sign of the last movement; a hold keeps it.
 
     Dry friction of contacts that the load itself presses together.
-
-    Source: handbook (Coulomb's law where the normal force goes with the load, as
-    between the leaves of a spring).
     """
 
     share: Scalar = parameter(

@@ -24,13 +24,9 @@ def scores(label: Int[Array, " n"]) -> PerRow:
 class Scatter(Effect):
     """An effect by which members, runs or specimens, deviate by sd · N(0, 1) each.
 
-    Its amplitude is the spread. `apply` uses fixed scores and serves tests and
-    illustrations. A calibration does not call it: its model has a zero for each run
-    and a stiffness for each specimen, integrates them out where it can, and infers
-    the spread under `run_offset_sd` and `specimen_sd`.
-
-    Class attributes:
-        members: run or specimen.
+    Its amplitude is the spread. `apply` uses fixed scores. A calibration does not call
+    it: its model has a zero for each run and a stiffness for each specimen, integrates
+    them out where it can, and infers `run_offset_sd` and `specimen_sd`.
     """
 
     members: ClassVar[Kind]

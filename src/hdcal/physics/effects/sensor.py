@@ -13,8 +13,6 @@ class RigCompliance(
 
     The stretch of the rig is read as deformation of the gear. Readings on the gear
     alone are those of a softer gear, so data never test this effect.
-
-    Source: handbook (machine compliance, ISO 14577-1).
     """
 
     compliance: Scalar = parameter(
@@ -30,8 +28,6 @@ class DisplacementNonlinearity(Effect, stage="deformation", family="curve up"):
 
     The characteristic of the displacement gauge is slightly curved. The parabola
     continues through zero, so the error has the same sign on either side.
-
-    Source: handbook (linearity error in the data sheet of a displacement gauge).
     """
 
     curvature: Scalar = parameter(
@@ -74,8 +70,6 @@ class ForceSaturation(Effect, stage="sensor", family="curve down"):
 
     A force sensor reads less and less of a large force. The loss of reading is h F² to
     first order, in proportion to h; in 1/F_s its derivative at zero would vanish.
-
-    Source: handbook (odd compressive characteristic of an amplifier near its limit).
     """
 
     curvature: Scalar = parameter(

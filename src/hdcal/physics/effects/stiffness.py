@@ -16,8 +16,6 @@ class ProgressiveStiffening(
     """F → F + k ω · a |ω|: tangent stiffness k (1 + 2 a |ω|).
 
     The contact line moves and teeth bed in.
-
-    Source: handbook (first-order hardening of a contact whose lever shortens).
     """
 
     slope: Scalar = parameter(

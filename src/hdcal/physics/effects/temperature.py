@@ -10,8 +10,6 @@ class ThermalExpansion(
     """ω → ω + a (T − T_ref), radial.
 
     Frame and gear expand: the zero of the displacement gauge moves.
-
-    Source: handbook (thermal expansion of unequal lengths in a measuring loop).
     """
 
     slope: Scalar = parameter(
@@ -33,8 +31,6 @@ class ThermalStiffness(
 
     The stiffness changes with temperature by more than the modulus explains. Readings
     give the sum of g and −α only; the prior of α separates them.
-
-    Source: handbook (fits and seats that tighten or loosen with temperature).
     """
 
     slope: Scalar = parameter(
@@ -52,8 +48,6 @@ class ThermalZeroDrift(
     """F → F + z (T − T_ref).
 
     The zero of the force sensor moves with temperature.
-
-    Source: handbook (temperature coefficient of zero in force-sensor data sheets).
     """
 
     slope: Scalar = parameter(

@@ -11,8 +11,6 @@ class ViscousDamping(
     """F → F + c dω/dt, with the rate as read.
 
     Drag in proportion to the speed of loading.
-
-    Source: handbook (linear viscous damping of the Kelvin-Voigt solid).
     """
 
     coefficient: Scalar = parameter(

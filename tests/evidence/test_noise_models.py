@@ -1,0 +1,90 @@
+"""Outliers by a bound of the sum over all assignments; noise as it was simulated."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from rigs import make_case, make_gear, ramp
+from scipy.special import betaln
+
+from hdcal.evidence.evaluation import Selection
+from hdcal.evidence.items import Amplitudes, Atoms
+from hdcal.evidence.linear_problem import LinearProblem, linear_problem
+from hdcal.evidence.noise_models import (
+    PRIOR_ODDS,
+    NoiseModel,
+    correlated_noise,
+    growing_noise,
+    outliers,
+)
+from hdcal.evidence.parts import Context, posterior
+from hdcal.inference.distributions import frozen
+from hdcal.physics.registry import EFFECTS
+
+ROWS, NOISE = 9, 0.4
+
+
+def problem_of(error: np.ndarray) -> LinearProblem:
+    records = ramp(len(error))
+    case = make_case(records, make_gear())
+    force = 195.0 * np.asarray(records.deformation) + 1.0 + error
+    object.__setattr__(case.records, "force", force)
+    return linear_problem(case, EFFECTS, noise_sd=NOISE)
+
+
+def evidence(problem: LinearProblem, noise: NoiseModel) -> float:
+    """Return the log evidence of the base model alone."""
+    none, rows = np.zeros(0), np.zeros((0, len(problem.y)))
+    index = none.astype(int)
+    atoms = Atoms(index, index, index, Amplitudes(*5 * [none]), none, rows, rows)
+    loose = np.zeros((0, 1, len(problem.y)))
+    selection = Selection(problem, atoms, loose, (), ("outside",))
+    return selection.evaluate(noise, Context(np.zeros(len(problem.y)), rows)).none
+
+
+@pytest.mark.parametrize("wild", [0.0, -6.0])
+def test_outliers_are_a_bound_of_the_sum_over_all_assignments(wild: float):
+    error = np.random.default_rng(1).normal(0.0, NOISE, ROWS)
+    error[4] += wild
+    problem = problem_of(error)
+
+    def fitted(weight):
+        return posterior(problem, NoiseModel("", weight, 0.0, 0.0), []).reading
+
+    (model,) = outliers(problem, 0.0, fitted)
+    bound = evidence(problem, model) - np.log(PRIOR_ODDS)
+    a, b = map(float, problem.priors["outliers.fraction"].numbers)
+    ratios = frozen(problem.priors["outliers.ratio"]).ppf([1 / 6, 1 / 2, 5 / 6])
+    terms = []
+    for ratio, some in product(ratios, product((0.0, 1.0), repeat=ROWS)):
+        weight = np.where(np.array(some) > 0.0, 1.0 / ratio, 1.0)
+        count = sum(some)
+        log_prior = betaln(a + count, b + ROWS - count) - betaln(a, b) - np.log(3.0)
+        terms.append(evidence(problem, NoiseModel("", weight, 0.0, log_prior)))
+    exact = float(np.logaddexp.reduce(terms))
+    assert exact - 4.0 < bound < exact + 0.02
+    equal = evidence(problem, NoiseModel("", np.ones(ROWS), 0.0, 0.0))
+    assert (bound > equal) == (wild != 0.0)
+
+
+def test_a_correlation_is_that_of_the_errors():
+    rng, error = np.random.default_rng(2), np.zeros(4000)
+    for row in range(1, len(error)):
+        error[row] = 0.7 * error[row - 1] + rng.normal(0.0, NOISE)
+    model = correlated_noise(problem_of(error), error, 0.98)
+    assert model.correlation == pytest.approx(0.7, abs=0.04)
+    sd = np.sqrt((1.0 - 0.7**2) / len(error))
+    assert np.exp(model.log_prior) == pytest.approx(np.sqrt(2.0 * np.pi) * sd, rel=0.1)
+
+
+def test_noise_that_grows_has_its_variance_and_at_most_its_prior():
+    problem = problem_of(np.random.default_rng(3).normal(0.0, NOISE, 30))
+    models = growing_noise(problem, 0.2)
+    assert sum(np.exp(m.log_prior) for m in models) <= PRIOR_ODDS
+    load = np.abs(np.asarray(problem.records.deformation) - 0.0)
+    for model in models:
+        variance = model.weight**-2.0
+        share = np.polyfit((load / load.max()) ** 2, variance, 1)
+        fitted = np.polyval(share, (load / load.max()) ** 2)
+        assert fitted == pytest.approx(variance, rel=0.05)
+        assert np.mean(np.log(variance)) == pytest.approx(0.0, abs=1e-9)
