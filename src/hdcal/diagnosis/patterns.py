@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jax import jit
 from scipy.special import ndtri
 
 from hdcal.data.case import Case
@@ -18,7 +19,6 @@ from hdcal.data.records import Records
 from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.base_model import moments
 from hdcal.evidence.linear_problem import LinearProblem, padded_records
-from hdcal.exported import jit
 from hdcal.inference.force_model.noise_form import loop_cells
 from hdcal.inference.force_model.residual_shapes import (
     Correlated,

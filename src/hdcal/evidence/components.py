@@ -23,7 +23,6 @@ from hdcal.evidence.parameter_grid import (
     ParameterGrid,
     make_grid,
 )
-from hdcal.exported import jit
 from hdcal.inference.force_model.padding import repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
@@ -215,7 +214,7 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     return Space(owner, principal(columns), sd * STEPS, log_mass)
 
 
-@jit
+@jax.jit
 def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 

@@ -19,7 +19,6 @@ from scipy.special import logsumexp, softmax
 from scipy.stats import multivariate_t
 
 from hdcal.data.records import Array
-from hdcal.exported import jit
 from hdcal.inference.diagnostics import pareto_shape
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sample import Progress
@@ -157,7 +156,7 @@ def _weights(
     return softmax(density - proposals.log_density(place))
 
 
-@jit
+@jax.jit
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
@@ -168,7 +167,7 @@ def _potentials(
     return jax.lax.map(one, standard)
 
 
-@jit
+@jax.jit
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
     def one(place):
         return values_at(problem, whitening.position(place))

@@ -16,7 +16,6 @@ from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy.optimize import minimize
 
 from hdcal.data.records import Array
-from hdcal.exported import jit
 from hdcal.inference.sampled_problem import Sampled, model
 
 Position = dict[str, Any]
@@ -44,13 +43,13 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-@jit
+@jax.jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
-@jit
+@jax.jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
@@ -97,7 +96,7 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     return Whitening(_position(place, flat + scale * result.x), factor)
 
 
-@jit
+@jax.jit
 def _start(problem: Sampled, known: Position) -> tuple[Position, Float[Array, " d"]]:
     """Return the position where a search starts, and the same flattened."""
     sites = trace(substitute(model, substitute_fn=_prior_middle)).get_trace(problem)
@@ -122,12 +121,12 @@ def _prior_middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@jit
+@jax.jit
 def _position(like: Position, flat) -> Position:
     return ravel_pytree(like)[1](flat)
 
 
-@jit
+@jax.jit
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian at a flat position."""
     _, unravel = ravel_pytree(like)

@@ -15,7 +15,6 @@ from numpyro.infer.hmc import hmc
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
-from hdcal.exported import jit
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.force_model.marginal import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
@@ -194,7 +193,7 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@jit(static_argnames=("warmup", "chains"))
+@jax.jit(static_argnames=("warmup", "chains"))
 def _start(problem, whitening, seed, chain, target, *, warmup, chains):
     """Return the state in which one of the chains starts, as its leaves."""
     walks, _ = jax.random.split(jax.random.key(seed))
@@ -204,7 +203,7 @@ def _start(problem, whitening, seed, chain, target, *, warmup, chains):
     return jax.tree.leaves(start(_OVERDISPERSION * spread, rng_key=walk))
 
 
-@jit(static_argnames=("warmup", "length"))
+@jax.jit(static_argnames=("warmup", "length"))
 def _advance(problem, whitening, leaves, target, *, warmup, length):
     """Return the state of a chain after so many steps, and what is kept of each."""
     start, step = _kernel(problem, whitening, warmup, target)
@@ -222,7 +221,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
     return jax.tree.leaves(state), kept
 
 
-@jit
+@jax.jit
 def _constrain(problem, whitening, standard, seed):
     """Return parameters by name, with draws of the members that were integrated out."""
     _, members = jax.random.split(jax.random.key(seed))

@@ -10,7 +10,6 @@ from scipy.special import chdtrc
 
 from hdcal.data.case import Case, Theory, require_case, require_force
 from hdcal.errors import Finding, Findings
-from hdcal.exported import jit
 from hdcal.inference.checks import Check
 from hdcal.inference.force_model.assembly import (
     MOST_LOG_LIKELIHOODS,
@@ -129,12 +128,12 @@ def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> dict[st
     )
 
 
-@jit
+@jax.jit
 def _slopes(problem: DynamicProblem, values, free):
     return jax.jacfwd(lambda moved: predict_motion(problem, {**values, **moved}))(free)
 
 
-@jit
+@jax.jit
 def _pointwise(problem: DynamicProblem, values):
     # Draws of a chain one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)

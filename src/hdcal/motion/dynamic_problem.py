@@ -11,6 +11,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 import numpy as np
 import numpyro
+from jax import jit
 from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear
@@ -18,7 +19,6 @@ from hdcal.data.prior import Prior, scaled
 from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
-from hdcal.exported import jit
 from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site, sample_stiffness
 from hdcal.inference.force_model.padding import measured, pad_records

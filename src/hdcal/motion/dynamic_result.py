@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, computed_field
 
-from hdcal.exported import jit
 from hdcal.motion.charts import motion_chart
 from hdcal.motion.dynamic_problem import (
     SITES,
@@ -109,6 +108,6 @@ def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> pd.DataFrame:
     )
 
 
-@jit
+@jax.jit
 def _each_motion(problem: DynamicProblem, values):
     return jax.lax.map(lambda value: predict_motion(problem, value), values)

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from hdcal.errors import NotUsable
-from hdcal.exported import jit
 from hdcal.inference.force_model.priors import without_scatter
 from hdcal.inference.force_model.problem import MEMBERS, case_reading
 from hdcal.inference.force_model.values import Values
@@ -110,7 +109,7 @@ def _computed(*given, kept):
     return jax.device_get(_moved(*given, kept=kept))
 
 
-@jit(static_argnames=("kept",))
+@jax.jit(static_argnames=("kept",))
 def _moved(draws, reading, at, force, times, reach, *, kept):
     """Return deformation, peak and outcome of each draw."""
 

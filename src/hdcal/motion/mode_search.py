@@ -11,7 +11,6 @@ import jax
 import numpy as np
 from scipy.optimize import minimize
 
-from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.distributions import frozen, moments
@@ -91,7 +90,7 @@ def _misfit(problem: DynamicProblem, place: np.ndarray) -> float:
     return 0.5 * problem.count * float(np.log(left))
 
 
-@jit
+@jax.jit
 def _fits(problem: DynamicProblem, shares, places):
     rows = len(problem.time)
     real = measured(rows, problem.count)

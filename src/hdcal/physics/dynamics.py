@@ -19,7 +19,6 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry, Records
-from hdcal.exported import jit
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
@@ -132,7 +131,7 @@ def acting(
     return kept, tuple(effect for effect in effects if not effect.instantaneous)
 
 
-@jit
+@jax.jit
 def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     """Return √(k/m)/2π of the undamped linear model [Hz]."""
     return jnp.sqrt(stiffness / mass) / (2.0 * jnp.pi)

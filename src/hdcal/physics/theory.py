@@ -7,10 +7,10 @@ displacement of the loaded point [N/mm]; all of them are linear in the modulus.
 from collections.abc import Callable
 
 import jax.numpy as jnp
+from jax import jit
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
-from hdcal.exported import jit
 
 Scalar = Float[Array, ""] | float
 Stiffness = Callable[[Geometry, Scalar], Scalar]

@@ -10,10 +10,10 @@ size is inferred from the residuals of the readings.
 from dataclasses import dataclass
 
 import numpy as np
+from jax import jit
 from scipy.special import softmax
 
 from hdcal.data.records import Records
-from hdcal.exported import jit
 from hdcal.inference.force_model.likelihood import row_precision
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.problem import Problem

@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
-from hdcal.exported import jit
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.values import (
     Values,
@@ -92,7 +91,7 @@ def force_of(
     return acting(values, force), noise
 
 
-@jit(static_argnames=("quantity", "asked"))
+@jax.jit(static_argnames=("quantity", "asked"))
 def forces_of_draws(
     problem: Problem,
     draws: Values,

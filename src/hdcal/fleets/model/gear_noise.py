@@ -17,7 +17,6 @@ from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
-from hdcal.exported import jit
 from hdcal.fleets.model.gear_quantity import NoiseNodes, off_probability
 from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site
@@ -97,7 +96,7 @@ def _(problem: GearNoise, values: Mapping) -> Float[Array, ""]:
     return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
-@jit
+@jax.jit
 def _moments(problem: GearNoise, values: Mapping):
     """Return mean and sd of log σ and the probability of being odd; [gear]."""
 

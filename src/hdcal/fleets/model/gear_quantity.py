@@ -28,7 +28,6 @@ from jaxtyping import Float, Int
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
-from hdcal.exported import jit
 from hdcal.fleets.model.groups import Grouping, group_offsets, sample_offsets
 from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site
@@ -152,7 +151,7 @@ class DrawnGears(NamedTuple):
     off: Float[Array, "t g"]
 
 
-@jit
+@jax.jit
 def draw_gears(problem: GearQuantity, values: Mapping, seed: int) -> DrawnGears:
     """Draw every gear from its posterior given each draw of the population, (t,)."""
 

@@ -164,7 +164,7 @@ def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
     their errors. The median of n has the tails of (n + 1)/2 degrees of freedom.
     """
     case = readings.case
-    table = _log_stiffness(sums.where(sums.products[:, 0, 0] > 0.0))
+    table: Any = _log_stiffness(sums.where(sums.products[:, 0, 0] > 0.0))
     rig = np.array(case.rigs)[table["run"]] if case.rigs else 0
     table = table.assign(rig=rig).sort_values("place")
     table["count"] = table.groupby(["gear", "rig"])["place"].transform("size")

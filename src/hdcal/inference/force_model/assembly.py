@@ -9,7 +9,6 @@ import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
-from hdcal.exported import jit
 from hdcal.inference.checks import Check, bound_check, conflict_check, sampling_checks
 from hdcal.inference.diagnostics import Convergence, diagnose_parameters, mixing
 from hdcal.inference.distributions import sample_prior
@@ -119,7 +118,7 @@ def force_log_likelihood(
     return {"force": np.asarray(each)[..., :rows]}
 
 
-@jit
+@jax.jit
 def _pointwise(problem, values, records, columns, before):
     def one(value):
         return pointwise_log_likelihood(problem, value, records, columns, before)

@@ -13,10 +13,10 @@ from dataclasses import replace
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax import jit
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
-from hdcal.exported import jit
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.physics.effect import Effect
 

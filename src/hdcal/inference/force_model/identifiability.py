@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
-from hdcal.exported import jit
 from hdcal.inference.checks import Check, listed
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
@@ -91,7 +90,7 @@ def linearise(
     return Linearisation(sd, slopes, np.hstack(members), np.concatenate(place))
 
 
-@jit(static_argnames=("names",))
+@jax.jit(static_argnames=("names",))
 def _derivatives(problem: Problem, values, records: Records, columns, *, names):
     """Return noise sd and derivatives of the mean reading by name."""
 

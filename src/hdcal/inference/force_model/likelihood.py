@@ -11,7 +11,6 @@ from jaxtyping import Float
 from scipy import special
 
 from hdcal.data.records import Array, Records
-from hdcal.exported import jit
 from hdcal.inference.force_model.marginal import linear_part
 from hdcal.inference.force_model.padding import measured
 from hdcal.inference.force_model.problem import Problem
@@ -109,7 +108,7 @@ def _(problem: Problem, values: Values) -> Float[Array, ""]:
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 
-@jit
+@jax.jit
 def log_likelihoods(problem: Sampled, draws: Values) -> Float[Array, "chain draw"]:
     """Return the log likelihood of all data by draw."""
     # One draw after the other: all rows of thousands of draws would fill the memory.

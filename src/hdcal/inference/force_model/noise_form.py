@@ -3,13 +3,13 @@
 from typing import NamedTuple
 
 import numpy as np
+from jax import jit
 from jaxtyping import Float
 from scipy.special import ndtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
 from hdcal.data.scatter import left_of_lines
-from hdcal.exported import jit
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.serial_correlation import previous_rows, whiten
 from hdcal.physics.history import stop_cells

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import equinox as eqx
 import numpy as np
+from jax import jit
 from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
@@ -11,7 +12,6 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Array, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, Findings
-from hdcal.exported import jit
 from hdcal.inference.force_model.compression import CompressedRows, compress
 from hdcal.inference.force_model.discrepancy import (
     Discrepancy,

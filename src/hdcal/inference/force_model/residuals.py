@@ -10,7 +10,6 @@ from scipy.special import ndtr, stdtr
 
 from hdcal.data.records import Records
 from hdcal.data.scatter import least_step
-from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
@@ -120,7 +119,7 @@ def residuals(posterior: Posterior) -> Residuals:
     )
 
 
-@jit
+@jax.jit
 def _fit(problem, values, records, columns):
     """Return the posterior mean of each row's mean reading [N], draw after draw."""
 

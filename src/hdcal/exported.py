@@ -1,3 +1,0 @@
-"""`jit` of JAX."""
-
-from jax import jit as jit
