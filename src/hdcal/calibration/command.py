@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @click.option(
     "--dynamic",
     is_flag=True,
-    help="DATA are a gear that moves: calibrate mass, damping and stiffness.",
+    help="Calibrate mass, damping and stiffness of a gear in motion.",
 )
 @sampling_options
 @folder_options("Result folder to make [default: NAME-calibration].")
@@ -48,7 +48,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     """Calibrate the force model against DATA and write a result folder.
 
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
-    gear set in motion, and mass, damping and stiffness are calibrated.
+    gear set in motion.
     """
     from hdcal.calibration.calibrate import choose_effects
     from hdcal.cli.progress import progress_bar
