@@ -12,7 +12,8 @@ import numpy as np
 from benchmarks.children import CASE
 
 # Order of the flattened unconstrained position.
-NAMES = ("E0", "_KE0", "alpha", "deformation_offset", "force_offset", "sigma")
+NAMES = ("E0", "_KE0", "_centre_force", "alpha", "deformation_offset", "sigma")
+SITES = {"_KE0": "K", "_centre_force": "force_offset"}
 CHAINS, WARMUP, DRAWS = 4, 1000, 1000
 
 
@@ -27,6 +28,7 @@ class Numbers:
     rows: np.ndarray
     count: np.ndarray
     unit_stiffness: np.ndarray
+    middle: np.ndarray
 
     def save(self, path: Path) -> None:
         np.savez(path, **vars(self))
@@ -40,15 +42,15 @@ class Numbers:
 def log_density(e, numbers: Numbers, xp):
     """Compute it with NumPy (any leading axes) or PyTensor, whichever `xp` is."""
     x = numbers.centre + e @ numbers.factor.T
-    u, v, alpha, zero, offset, w = (x[..., i] for i in range(6))
-    modulus, log_K = xp.exp(u), v - u
-    parts = (modulus, log_K, alpha, zero, offset, w)
+    u, v, force, alpha, zero, w = (x[..., i] for i in range(6))
+    slope = xp.exp(v) * float(numbers.unit_stiffness)
+    modulus, log_K, offset = xp.exp(u), v - u, force - slope * float(numbers.middle)
+    parts = (modulus, log_K, offset, alpha, zero, w)
     # The Jacobian of log E0; those of the lognormals cancel.
     total = u
     for value, mean, sd in zip(parts, numbers.mean, numbers.sd, strict=True):
         total = total - 0.5 * ((value - mean) / sd) ** 2
         total = total - (0.5 * np.log(2.0 * np.pi) + np.log(sd))
-    slope = xp.exp(v) * float(numbers.unit_stiffness)
     c = (slope, -slope * alpha, offset - slope * zero, slope * alpha * zero)
     squares = 0.0
     for row in numbers.rows:
@@ -79,7 +81,7 @@ def make_numbers() -> tuple[Numbers, float]:
 
     problem = make_problem()
     whitening = laplace.fit(problem)
-    laws = [problem.priors[name.replace("_KE0", "K")] for name in NAMES]
+    laws = [problem.priors[SITES.get(name, name)] for name in NAMES]
     centre = np.array([whitening.centre[name] for name in sorted(whitening.centre)])
     numbers = Numbers(
         centre=centre,
@@ -89,6 +91,7 @@ def make_numbers() -> tuple[Numbers, float]:
         rows=problem.blocks.factor[0],
         count=problem.blocks.count[0],
         unit_stiffness=np.asarray(problem.unit_stiffness),
+        middle=np.asarray(problem.centre),
     )
     if tuple(sorted(whitening.centre)) != NAMES:
         raise RuntimeError(f"other coordinates: {sorted(whitening.centre)}")

@@ -148,10 +148,10 @@ def _line(words: str, runs: list, own: float) -> tuple:
 
 def priors() -> dict:
     """Return what hdcal takes for the case, as numbers."""
-    from benchmarks.density import NAMES, make_problem
+    from benchmarks.density import NAMES, SITES, make_problem
 
     problem, kinds = make_problem(), {"normal": "Normal", "lognormal": "LogNormal"}
-    laws = {n: problem.priors[n] for n in (n.replace("_KE0", "K") for n in NAMES)}
+    laws = {n: problem.priors[n] for n in (SITES.get(n, n) for n in NAMES)}
     return {
         "priors": {name: _law(kinds[p.family], p.numbers) for name, p in laws.items()},
         "unit_stiffness": float(problem.unit_stiffness),

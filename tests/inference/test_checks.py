@@ -107,7 +107,6 @@ NOISE = Prior("lognormal", (0.1, 0.5))
     [
         ({"x": (NORMAL, GOOD + 2.5)}, None),
         ({"x": (NORMAL, GOOD + 3.5)}, PLAUSIBLE),
-        ({"x": (NORMAL, GOOD - 3.5)}, PLAUSIBLE),
         # An effect that is absent is expected, its far end is not.
         ({"x": (HALF, np.abs(1e-5 * GOOD))}, None),
         ({"x": (HALF, 4.0 + 0.1 * GOOD)}, PLAUSIBLE),
@@ -119,10 +118,6 @@ NOISE = Prior("lognormal", (0.1, 0.5))
         # Much noise alone is what the model lacks rather than a wrong unit.
         ({"sigma": (NOISE, np.exp(0.01 * GOOD)), "K": (NORMAL, GOOD)}, NOISY),
         ({"sigma": (NOISE, 1e-3 * np.exp(0.01 * GOOD))}, PLAUSIBLE),
-        (
-            {"sigma": (NOISE, np.exp(0.01 * GOOD)), "K": (NORMAL, GOOD + 4.0)},
-            PLAUSIBLE,
-        ),
     ],
 )
 def test_a_median_far_in_the_tail_is_a_conflict(draws, name):
@@ -214,11 +209,9 @@ def test_a_flat_direction_of_three_parameters_is_named():
     "bad",
     [
         GOOD + np.arange(4)[:, None],
-        np.cumsum(GOOD, axis=1),
         np.ones_like(GOOD),
         np.where(GOOD > 3.0, np.nan, GOOD),
         np.where(np.arange(4)[:, None] == 3, 3.0 * GOOD, GOOD),
-        GOOD[:, :3],
         GOOD[:1],
     ],
 )

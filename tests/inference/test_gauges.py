@@ -9,13 +9,13 @@ from gauged import SDS, certified, told, with_gear
 from rigs import cycles, draw_truth, make_case, make_gear, make_records, ramp, simulate
 from scipy import stats
 from slices import slice_of
+from stated_density import log_prior
 from structures import form_of
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.gear_file.certificates import ForceCertificate, certificate_priors
 from hdcal.data.priors import effect_priors
 from hdcal.inference.force_model.likelihood import log_likelihood
-from hdcal.inference.force_model.priors import problem_priors
 from hdcal.inference.force_model.problem import build_problem
 from hdcal.inference.posterior import Posterior
 
@@ -66,16 +66,21 @@ def test_mountings_add_to_the_zero_that_a_certificate_states():
     certificate = {"force_calibration": ForceCertificate(expanded_N=0.2)}
     gear = make_gear()
     gear = replace(gear, priors=gear.priors | certificate_priors(certificate))
-
-    def zero(records):
-        case = make_case(records, gear)
-        return problem_priors(case, (), effect_priors(), "ring")
-
-    found = zero(several(ramp(12)))
-    wide = found["run_offset_sd"].numbers[0]
-    expected = np.hypot(0.1, wide / np.sqrt(3.0))
-    assert found["force_offset"].numbers == pytest.approx((0.0, expected))
-    assert zero(ramp(12))["force_offset"].numbers == pytest.approx((0.0, 0.1))
+    case = make_case(several(ramp(12)), gear)
+    problem = build_problem(case, effect_priors(), structure=form_of(case))
+    grid = np.linspace(-3.0, 3.0, 60_001)
+    gauge = stats.norm.pdf(grid, 0.0, 0.1)
+    spread = {"run_offset_sd": np.float64(0.7)}
+    wide = problem.priors["run_offset_sd"].numbers[0]
+    for zero in (-0.5, 0.0, 0.8):
+        mountings = stats.norm.pdf(zero - grid, 0.0, 0.7 / np.sqrt(3.0))
+        density = np.log(np.trapezoid(gauge * mountings, grid))
+        density += stats.halfnorm.logpdf(0.7, scale=wide)
+        found = float(log_prior(problem, spread | {"force_offset": np.float64(zero)}))
+        assert found == pytest.approx(density, rel=1e-6)
+    # No certificate, or one mounting: as it is stated.
+    for other in (replace(problem, zero_stated=False), replace(problem, runs=0)):
+        assert other.priors_given({}) == problem.priors
 
 
 def precise(gear):

@@ -24,16 +24,6 @@ class Skew(Sampled):
         numpyro.sample("place", dist.Normal(2.0 * size, 1.0))
 
 
-class Tails(Sampled):
-    """A site whose tails are Cauchy's."""
-
-    priors: dict[str, Prior]
-
-    def declare(self) -> None:
-        """Declare it."""
-        numpyro.sample("place", dist.Cauchy(0.0, 1.0))
-
-
 class Funnel(Sampled):
     """A scale of eight numbers, of which nothing was measured."""
 
@@ -83,10 +73,3 @@ def test_wrong_weights_would_be_noticed(monkeypatch):
 
 def test_what_proposals_do_not_cover_is_not_drawn():
     assert [drawn(Funnel({}), seed) for seed in range(3)] == [None] * 3
-
-
-def test_tails_heavier_than_any_proposal_are_drawn_right_or_not_at_all():
-    drawn_at_all = [found for seed in range(6) if (found := drawn(Tails({}), seed))]
-    assert drawn_at_all
-    place = np.concatenate([found.values["place"][:, ::8] for found in drawn_at_all])
-    assert stats.kstest(place.ravel(), stats.cauchy.cdf).pvalue > 0.001

@@ -144,13 +144,6 @@ def test_correlated_noise_of_one_size_rarely_grows(monkeypatch):
     assert grown(1.0) > 0.12
 
 
-@pytest.mark.parametrize(("growth", "grows"), [(0.03, False), (0.3, True)])
-def test_of_many_rows_a_trace_of_growth_is_none(growth, grows):
-    x = np.linspace(0.02, 0.54, 100_000)
-    noise = np.random.default_rng(3).normal(size=len(x))
-    assert noise_grows(case_of(0.6 * (1.0 + growth * x / 0.54) * noise, x=x)) is grows
-
-
 def test_what_a_loop_leaves_at_its_turns_does_not_grow(monkeypatch):
     """Six gears that stick before they slip, of noise that is the same everywhere."""
     up, rng = np.linspace(0.0, 0.6, 14), np.random.default_rng(4)

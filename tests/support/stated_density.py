@@ -15,7 +15,7 @@ from hdcal.inference.laplace import potential, values_at
 def log_prior(problem, values):
     """Return the log prior of the named parameters, each in its native coordinate."""
     total = 0.0
-    for name, prior in problem.priors.items():
+    for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":
             total = total + distribution(prior, name).log_prob(values[name])
     return total

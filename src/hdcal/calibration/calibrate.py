@@ -15,12 +15,7 @@ from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.checks import (
-    Check,
-    correlation_check,
-    growth_check,
-    rounding_check,
-)
+from hdcal.inference.checks import Check, correlation_check, rounding_check
 from hdcal.inference.force_model.assembly import (
     assemble,
     force_log_likelihood,
@@ -103,8 +98,7 @@ def calibrate(
     asked = choose_effects(effects, registry)
     check_effect_priors(case, registry)
     chosen, shipped = asked, effect_priors(case.gear.full_scale)
-    grows = adapt_noise and _may_grow(case, asked) and noise_grows(case)
-    if grows:
+    if adapt_noise and _may_grow(case, asked) and noise_grows(case):
         chosen, shipped = (*asked, HeteroscedasticNoise), shipped | _SHOWN
         case = _with_constant_part(case)
     form = decide_structure(case, asked, with_gap)
@@ -118,7 +112,6 @@ def calibrate(
     checks = [
         rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
         correlation_check(found.values, len(records.force), form.why_independent),
-        growth_check(found.values, unasked=grows),
     ]
     if not asked and with_gap is None:
         # An effect, or a requested bend, is a reason for another stiffness.

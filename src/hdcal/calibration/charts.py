@@ -33,16 +33,14 @@ _MARKERS = {1: ("^", INK), -1: ("v", GREY)}
 def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Chart:
     """Return force over deformation, and below it the distance from the fit.
 
-    Args:
-        posterior: that was calibrated.
-        bands: over the tested range, at one or more temperatures.
-        left: residuals of the posterior.
+    The bands are over the tested range, at one or more temperatures.
     """
     gear, gap = posterior.case.gear, posterior.problem.discrepancy
     axis, units = displacement_axis(posterior.case), posterior.case.units
     levels = np.unique(bands.temperature_C)
     colours = ascending_colours(len(levels))
-    nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
+    warmth, place = left.records.temperature, left.records.deformation
+    nearest = np.argmin(np.abs(np.asarray(warmth)[:, None] - levels), axis=1)
     distance = _distance_from_model(bands, left)
     reach = _reach(bands, distance)
     top, panels, found = [*band_marks(bands)], [], posterior.case.screening
@@ -51,7 +49,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
     for index, (level, colour) in enumerate(zip(levels, colours, strict=True)):
         here = nearest == index
         points = "" if len(levels) == 1 else colour
-        top += _readings(left, left.measured, here, points, "measured")
+        top += _readings(left, place, left.records.force, here, points, "measured")
         marks = [
             mark
             for branch in branches(bands)
@@ -68,7 +66,11 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
                 title="distance from the model"
                 if len(levels) == 1
                 else f"at {level:g} °C",
-                marks=[*marks, Rule(at=0.0), *_readings(left, distance, here, points)],
+                marks=[
+                    *marks,
+                    Rule(at=0.0),
+                    *_readings(left, place, distance, here, points),
+                ],
                 y_limits=(-reach, reach),
                 height=2.3,
             )
@@ -89,9 +91,9 @@ def _distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
     # The discrepancy is a part of the fit, and does not depend on the temperature.
     curves = {bands.direction[b.rows[0]]: b.rows for b in branches(bands)}
     for direction, rows in curves.items():
-        rising = (left.direction >= 0.0) == (direction == "up")
+        rising = (left.records.sense >= 0.0) == (direction == "up")
         here = rising if len(curves) > 1 else slice(None)
-        place = left.deformation[here]
+        place = left.records.deformation[here]
         distance[here] += np.interp(place, bands.deformation_mm[rows], gap[rows])
     return distance
 
@@ -106,21 +108,18 @@ def _reach(bands: Bands, distance: np.ndarray) -> float:
 
 
 def _readings(
-    left: Residuals,
-    y: np.ndarray,
-    here: np.ndarray,
-    colour: str = "",
-    label: str = "",
-    x: np.ndarray | None = None,
+    left: Residuals, x, y, here: np.ndarray, colour: str = "", label: str = ""
 ) -> Iterator[Points]:
-    """Yield some rows as points over the deformation or `x`, each direction apart."""
-    x = left.deformation if x is None else x
-    words = movement_words(left.deformation, left.units.displacement)
-    for sense, (marker, usual) in _MARKERS.items():
-        rows = here & (left.direction == sense)
+    """Yield some rows as points, each direction with its marker."""
+    x, y, sense = map(np.asarray, (x, y, left.records.sense))
+    words = movement_words(
+        np.asarray(left.records.deformation), left.units.displacement
+    )
+    for sign, (marker, usual) in _MARKERS.items():
+        rows = here & (sense == sign)
         if rows.any():
             yield Points(
-                label=f"{label}, {words[sense]}" if label else "",
+                label=f"{label}, {words[sign]}" if label else "",
                 x=x[rows],
                 y=y[rows],
                 colour=colour or usual,
@@ -130,20 +129,21 @@ def _readings(
 
 def residual_chart(left: Residuals) -> Chart:
     """Return standardised residuals over deformation, order and temperature."""
-    units, y, every = left.units, left.standardised, np.full(len(left.residual), True)
+    units, y, rows = left.units, left.standardised, left.records
+    every = np.full(len(y), True)
     places = {
-        f"{units.displacement} as read [{units.displacement_unit}]": left.deformation,
+        f"{units.displacement} as read [{units.displacement_unit}]": rows.deformation,
         "row of the data": np.arange(1.0, len(every) + 1.0),
     }
-    if np.ptp(left.temperature) > 0.0:
-        places["temperature [°C]"] = left.temperature
+    if np.ptp(rows.temperature) > 0.0:
+        places["temperature [°C]"] = rows.temperature
     reach = max(3.0, 1.1 * float(np.max(np.abs(y))))
     frame = [Span(low=-2.0, high=2.0, label="±2 sd"), Rule(at=0.0)]
     panels = [
         Panel(
             x=axis,
             y="(measured − fit) / sd",
-            marks=[*frame, *_readings(left, y, every, label="measured", x=x)],
+            marks=[*frame, *_readings(left, x, y, every, label="measured")],
             y_limits=(-reach, reach),
             wide=True,
             height=2.5,

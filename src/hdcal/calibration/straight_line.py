@@ -70,12 +70,8 @@ def robust_line(records: Records) -> RobustLine | None:
 def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> "Check":
     """Fail a stiffness that is far from a robust straight line without a reason.
 
-    Also that of a part without sizes where the readings do not determine its sign.
-
-    Args:
-        records: the rows.
-        stiffness: draws of the stiffness as read [N/mm], of a model without effects.
-        sized: whether a theory gives the stiffness from the sizes of the part.
+    Also that of a part without sizes where the readings do not determine its sign. The
+    draws of the stiffness as read [N/mm] are of a model without effects.
     """
     from hdcal.inference.checks import Check
 
@@ -113,9 +109,7 @@ def takes_straight_part(case: Case) -> bool:
 def straight_check(case: Case, stiffness: np.ndarray) -> "Check":
     """Fail the one stiffness of a curve that has another one over its straight part.
 
-    Args:
-        case: records with their screening.
-        stiffness: draws of the stiffness as read [N/mm], of a model without effects.
+    The draws of the stiffness as read [N/mm] are of a model without effects.
     """
     from hdcal.inference.checks import Check
 

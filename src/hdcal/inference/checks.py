@@ -127,28 +127,10 @@ def correlation_check(
     )
 
 
-def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
-    """Report noise that grows with the force, on request or by the readings."""
-    name = "readings scatter alike at any {load}"
-    share = draws.get("heteroscedastic_noise.share")
-    if share is None:
-        return Check(name, "passed", "the noise is of one size in this model")
-    words = (
-        f"readings scatter by {np.median(share):.1%} of the {{load}}, and by σ at no "
-        "{load}; every interval allows for it"
-    )
-    if unasked:
-        words += ". A prior of heteroscedastic_noise.share, fixed at zero, turns it off"
-    return Check(name, "note", words)
-
-
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
-    """Fail a result whose noise is too small for Sheppard's correction.
+    """Fail a result whose noise sd [N] is too small for Sheppard's correction.
 
-    Args:
-        step: rounding step [N].
-        rounded: whether the exact rounding likelihood was used.
-        sigma: draws of the noise sd [N].
+    `rounded` tells whether the exact likelihood of the rounding step [N] was used.
     """
     limit = COARSEST_STEP * float(np.median(sigma))
     how = f"by Sheppard's correction; that holds up to {limit:.3g} {{N}}"

@@ -44,9 +44,7 @@ _BLOCK = 500
 class Proposals(NamedTuple):
     """Multivariate t distributions of increasing width about one centre.
 
-    Attributes:
-        centre: shape (d,).
-        covariance: scale matrix of the narrowest one, shape (d, d).
+    The scale matrix is that of the narrowest one.
     """
 
     centre: np.ndarray
@@ -87,14 +85,7 @@ def sample_by_importance(
     """Draw from a posterior with few parameters; None where proposals cover it badly.
 
     The effective sample size of the proposals is at least half the number of draws.
-
-    Args:
-        problem: the inference problem, with every parameter among its coordinates.
-        whitening: its mode and curvature, from `laplace.fit`.
-        seed: the same one gives the same draws.
-        chains: groups of draws, which are exchangeable.
-        draws: kept of each group.
-        progress: called with (densities computed, densities in all).
+    Parameters as of `sample`; `progress` is called with numbers of densities.
     """
     rng, kept = np.random.default_rng(seed), chains * draws
     proposals, efficiency = _adapted(problem, whitening, rng)

@@ -28,10 +28,8 @@ _OPTIONS = {"gtol": 1e-6, "max_trust_radius": 1e4, "maxiter": 300}
 class Whitening(eqx.Module):
     """Affine map from standard to unconstrained coordinates: x = centre + factor·e.
 
-    Attributes:
-        centre: the posterior mode, one entry per site name.
-        factor: root of the inverse Hessian there, rows in the order of the flattened
-            centre.
+    The centre is the posterior mode by site name, and the factor a root of the inverse
+    Hessian there, rows in the order of the flattened centre.
     """
 
     centre: Position
@@ -62,10 +60,8 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     A poor mode costs speed, never correctness: NUTS samples the exact density in any
     coordinates.
 
-    Args:
-        problem: the inference problem.
-        start: sites whose value is roughly known; the others start in the middle of
-            their prior.
+    The search starts at roughly known values of sites, and else in the middle of the
+    priors.
     """
     place, flat = _start(problem, dict(start or {}))
     flat = np.asarray(flat)

@@ -28,11 +28,9 @@ _WEIGHT, _LEFT_OUT = "probability", "left_out"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Hypotheses of a diagnosis without a usable calibration.
+    """Probability of all hypotheses without a usable calibration.
 
-    Attributes:
-        probability: of them all.
-        counted_as: the calibrated hypothesis to which their probability is added.
+    It is added to that of the calibrated hypothesis `counted_as`.
     """
 
     probability: float
@@ -41,11 +39,9 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class ModelAverage:
-    """Calibrated models of the same data, each with its probability.
+    """Calibrated models of the same data by hypothesis, each with its probability.
 
-    Attributes:
-        posteriors: probability and posterior by hypothesis; the probabilities sum to 1.
-        left_out: what has no model among these; None without any.
+    The probabilities sum to 1; `left_out` is what has no model among these.
     """
 
     posteriors: Mapping[str, tuple[float, Posterior]]
@@ -115,12 +111,8 @@ def load_models(
 ) -> Posterior | ModelAverage:
     """Read a calibration of the gear at rest, or the models of a diagnosis.
 
-    Args:
-        path: a result folder or its posterior.nc.
-        kinds: further kinds of posteriors that may be read.
-
-    Raises:
-        InputError, NotUsable: as of `Posterior.load`.
+    The path is a result folder or its posterior.nc; `kinds` are further kinds of
+    posteriors that may be read. Errors as of `Posterior.load`.
     """
     file = file_of(path)
     tree = read_tree(file)

@@ -110,6 +110,11 @@ class Posterior(Shown):
         """Median of each site over all draws, in code units."""
         return {name: np.median(v, axis=0) for name, v in self.draws.items()}
 
+    @cached_property
+    def effective_priors(self) -> Mapping[str, Prior]:
+        """The priors, that of the force zero given how the mountings differ."""
+        return self.problem.priors_given(self.median)
+
     def require_usable(self) -> None:
         """Raise `NotUsable`, with the reasons, when a check failed."""
         if not self.usable:
@@ -145,9 +150,8 @@ class Posterior(Shown):
     def load(cls, path: Path | str, effects: Library | None = None) -> Self:
         """Read the posterior of one model.
 
-        Args:
-            path: a result folder or its posterior.nc.
-            effects: library of effects; needed for effects from outside.
+        The path is a result folder or its posterior.nc. Effects from outside need
+        their library.
 
         Raises:
             InputError: the file is missing, damaged, changed, of several models or

@@ -48,13 +48,9 @@ def dataset(
     units: Mapping[str, str] | None = None,
     labels: Mapping[str, Iterable[str]] | None = None,
 ) -> xr.Dataset:
-    """Return arrays as a group, with their axes and units.
+    """Return arrays by name as a group, with their axes, units and labels.
 
-    Args:
-        arrays: by name.
-        sample: their first axes.
-        units: by name, of those that have one.
-        labels: along other axes; chains and draws are numbered.
+    `sample` are the first axes; chains and draws are numbered.
     """
     units = units or {}
     group = xr.Dataset(
@@ -134,8 +130,7 @@ def describe_case(case: Case) -> str:
 def restore_case(text: str, tree: xr.DataTree) -> Case:
     """Return the case of a posterior.
 
-    Raises:
-        KeyError, TypeError, ValueError: text and rows do not describe a case.
+    `KeyError`, `TypeError` or `ValueError` if text and rows do not describe a case.
     """
     fields = json.loads(text)
     gear = fields["gear"]

@@ -44,12 +44,9 @@ _STATISTICS = {
 
 @dataclass(frozen=True)
 class Draws:
-    """Draws with the sampler's statistics; leading axes are chain and draw.
+    """Draws by site name, in code units, and statistics under ArviZ' names.
 
-    Attributes:
-        values: by site name, in code units.
-        statistics: of the sampler, under ArviZ' names.
-        target_acceptance: mean acceptance probability that was aimed at.
+    Leading axes are chain and draw.
     """
 
     values: dict[str, np.ndarray]
@@ -82,14 +79,8 @@ def sample(
     A run with divergent trajectories is discarded and repeated with shorter steps. A
     run whose chains have not mixed is extended, to at most four times its length.
 
-    Args:
-        problem: the inference problem.
-        whitening: coordinates from `laplace.fit`.
-        seed: of `jax.random.key`.
-        chains: independent chains, one after the other in each stretch.
-        warmup: iterations of adaptation per chain, discarded.
-        draws: iterations kept per chain, or a multiple of them.
-        progress: called after every stretch.
+    Coordinates are those of `laplace.fit`. Numbers of iterations are those of each
+    chain: `warmup` for adaptation, and `draws` kept, or a multiple of them.
     """
     found = None
     for target in TARGET_ACCEPTANCE:

@@ -1,5 +1,6 @@
 """The interface of what is sampled: priors and a declared density."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -27,6 +28,10 @@ class Sampled(eqx.Module):
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
         raise NotImplementedError(type(self).__name__)
+
+    def priors_given(self, values: Mapping) -> dict[str, Prior]:
+        """Return the prior of each parameter given the scales of one draw."""
+        return self.priors
 
 
 def model(problem: Sampled) -> None:

@@ -188,6 +188,11 @@ class DynamicPosterior(Posterior):
     kind: ClassVar[str] = "dynamic"
 
     @cached_property
+    def effective_priors(self) -> Mapping[str, Prior]:
+        """The priors; none depends on another parameter."""
+        return self.priors
+
+    @cached_property
     def problem(self) -> Problem:
         """Raise `InputError`, as there is no model of the force as read."""
         words = "this is a calibration of the moving gear, without a force offset"

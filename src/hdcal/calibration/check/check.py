@@ -111,11 +111,8 @@ class Screened(Item):
 class CaseCheck(Result):
     """What was read of a case.
 
-    Attributes:
-        screening: None where the rows are not those of a file.
-        case: what was read.
-        implausible_K: slope of the readings as K, with the ends of its prior, if it
-            lies outside.
+    There is no screening of rows that are not those of a file. `implausible_K` is the
+    slope of the readings as K, with the ends of its prior, if it lies outside.
     """
 
     template = "calibration/check/report.md.j2"

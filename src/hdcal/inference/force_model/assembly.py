@@ -55,22 +55,16 @@ def assemble(
 ) -> tuple[xr.DataTree, dict[str, Convergence], tuple[Check, ...]]:
     """Return the tree, diagnoses and checks of a posterior.
 
-    Args:
-        case: data and gear.
-        priors: of every site.
-        problem: inference problem.
-        draws: from the sampler.
-        seed: of the prior draws.
-        log_likelihood: by observed column, (chain, draw, row); none for many rows, of
-            which the total is kept.
-        sensitivities: of the mean reading to each parameter, in noise sds.
-        mixed: further quantities whose chains must have mixed, (chain, draw) each.
-        checks: further ones.
-        observed: columns of the records that the model explains.
+    The log likelihood is by observed column, (chain, draw, row), or empty for many
+    rows, of which the total is kept. Sensitivities are those of the mean reading to
+    each parameter, in noise sds. The chains of `mixed`, (chain, draw) each, must have
+    mixed as those of the parameters.
     """
     values = draws.values
+    # Draws are compared with the priors given how the mountings differ.
+    given = problem.priors_given(draws.median)
     sampled = {
-        name: prior
+        name: given[name]
         for name, prior in priors.items()
         if name in values and prior.family != "fixed"
     }
@@ -98,7 +92,7 @@ def assemble(
         *checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
-        *identification_checks(sensitivities, priors),
+        *identification_checks(sensitivities, given),
     )
     return xr.DataTree.from_dict(groups), diagnoses, checks
 

@@ -52,13 +52,8 @@ def compress(
 ) -> CompressedRows | None:
     """Reduce rows to one triangular factor per run and specimen, or two.
 
-    None where the stated sd of a reading differs from row to row.
-
-    Args:
-        columns: X, shape (n, p).
-        records: the rows.
-        before: index of the row before each, −1 for none; None where neighbours are
-            not correlated.
+    None where the stated sd of a reading differs from row to row. `columns` are X,
+    (n, p); `before` is None where neighbours are not correlated.
     """
     if np.ptp(records.force_sd) > 0.0:
         return None

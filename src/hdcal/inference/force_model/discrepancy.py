@@ -61,11 +61,9 @@ class Discrepancy(eqx.Module):
     def columns(
         self, deformation: Float[Array, " n"], movement: Float[Array, " n"]
     ) -> Float[Array, "n m"]:
-        """Return the projected functions at any deformations, tested or not.
+        """Return the projected functions at any deformations as read [mm].
 
-        Args:
-            deformation: as read [mm].
-            movement: +1 where it rises, −1 where it falls, 0 for the mean of both.
+        The movement is +1 where it rises, −1 where it falls, 0 for the mean of both.
         """
         scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
         line = jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
@@ -79,14 +77,10 @@ class Discrepancy(eqx.Module):
         return used * (functions - line @ self.absorbed)
 
     def prior_sd(self, sd, length) -> Float[Array, " m"]:
-        """Return the prior sd of the weights [N].
+        """Return the prior sd of the weights [N], for an sd [N] and length-scale.
 
-        Half a loop has an offset and a slope besides the smooth functions, of the size
-        of the discrepancy each.
-
-        Args:
-            sd: of the discrepancy [N].
-            length: length-scale as a share of the tested range [-].
+        The length-scale is a share of the tested range. Half a loop also has an offset
+        and a slope, of the size of the discrepancy each.
         """
         smooth = prior_sd(sd, length)
         if not self.directed:
@@ -99,10 +93,8 @@ def build_discrepancy(
 ) -> Discrepancy:
     """Project the functions off an offset and a slope at the tested rows.
 
-    Args:
-        records: tested rows.
-        effects: of the model; where the force of one depends on the direction of the
-            movement, half a loop is left out, which could not be distinguished from it.
+    Half a loop is left out where the force of an effect depends on the direction of
+    the movement, from which it could not be distinguished.
     """
     deformation = np.asarray(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))

@@ -43,10 +43,7 @@ _HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 class Linear(eqx.Module):
     """A linear-Gaussian residual in noise sds; rows may be compressed.
 
-    Attributes:
-        residual: reading less its mean, shape (r,).
-        design: Z, contribution of each score to the rows.
-        log_scale: Σ log sd √(2π) over the measured rows.
+    `design` is Z, and `log_scale` Σ log sd √(2π) over the measured rows.
     """
 
     residual: Float[Array, " r"]

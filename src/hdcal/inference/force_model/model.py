@@ -36,7 +36,10 @@ def declare(problem: Problem) -> None:
     # stiffness, which is curved in the zero and the logarithm of the stiffness.
     there = stiffness(problem, values) * problem.centre
     name = "force_offset"
-    values[name] = sample_moved(name, priors[name], "_centre_force", shift=there)
+    if problem.runs:
+        values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
+    zero = problem.priors_given(values)[name]
+    values[name] = sample_moved(name, zero, "_centre_force", shift=there)
     with_slack = SLACK in priors
     if not with_slack:
         values[CONTACT] = sample_site(CONTACT, priors[CONTACT])
@@ -154,13 +157,12 @@ def _sample_effect(
 
 
 def _sample_members(problem: Problem, values: dict) -> None:
-    """Sample scales of runs, specimens and discrepancy, and members if not integrated.
+    """Sample scales of specimens and discrepancy, and members if not integrated.
 
     Runs and specimens are deviations from the mean of the tested ones.
     """
     integrated, priors = problem.integrated, problem.priors
-    names = ["run_offset_sd"] if problem.runs else []
-    names += ["specimen_sd"] if problem.specimens else []
+    names = ["specimen_sd"] if problem.specimens else []
     names += ["gap_sd", "gap_length"] if problem.discrepancy is not None else []
     values |= {name: sample_site(name, priors[name]) for name in names}
     if problem.runs and "run" not in integrated:

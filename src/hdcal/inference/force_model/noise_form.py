@@ -101,20 +101,15 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
 
 
 def pilot_fit(records: Records) -> BaseForces:
-    """Return a generous fit, from which the noise is read before any sampling.
-
-    Too small a noise only chooses the exact likelihood of rounded readings, which is
-    never wrong.
-    """
+    """Return a generous fit, for the size of the noise before any sampling."""
+    # Too small a noise only chooses the exact likelihood of rounded readings.
     return base_model(records, "bend")
 
 
 def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:
     """Return the states of cells that stick and then slip, −1 … 1, row by row.
 
-    Args:
-        records: the rows.
-        shares: of the range of the deformation, after which a cell slips, shape (c,).
+    A cell slips after its share (c,) of the range of the deformation.
     """
     padded = pad_records(records)
     reach = shares * np.ptp(np.asarray(records.deformation))

@@ -1,17 +1,12 @@
 """Priors of the sites of a force model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-
-import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
-from hdcal.inference.distributions import moments
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
@@ -37,11 +32,7 @@ def problem_priors(
 ) -> dict[str, Prior]:
     """Return the priors of every site, K carried over to the theory in use.
 
-    Args:
-        case: gear, whose stated priors win.
-        effects: in the model.
-        shipped: priors of every effect in the library.
-        theory: which stiffness K multiplies.
+    What the gear file states replaces what is shipped for effects.
 
     Raises:
         InputError: an effect's parameter has no prior.
@@ -64,14 +55,6 @@ def problem_priors(
         )
     priors = {name: table[name] for name in names}
     priors["K"] = influence_prior(case, theory)
-    zero = priors["force_offset"]
-    if is_stated(zero) and "run" in case.records.known:
-        # A certificate states the zero of the gauge. The mean of n mountings adds 1/n
-        # of the variance between them, of which the prior gives the expectation.
-        between = float(np.hypot(*moments(priors["run_offset_sd"])))
-        middle, gauge = map(float, zero.numbers)
-        sd = float(np.hypot(gauge, between / np.sqrt(len(case.run_labels))))
-        priors["force_offset"] = replace(zero, numbers=(middle, sd))
     return priors
 
 

@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jax import jit
 from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
+from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array, Records
 from hdcal.data.theory_names import Theory
@@ -65,6 +67,7 @@ class Problem(Sampled):
         specimens: number of specimens with a stiffness each, 0 = none.
         integrated: kinds of members that are integrated out.
         correlated: whether neighbouring readings of a run may be correlated.
+        zero_stated: whether a certificate states the zero of the force gauge.
     """
 
     priors: dict[str, Prior]
@@ -84,12 +87,26 @@ class Problem(Sampled):
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
     correlated: bool = eqx.field(static=True)
+    zero_stated: bool = eqx.field(static=True)
 
     @property
     def sampled_weights(self) -> int:
         """Number of weights of a discrepancy that is not integrated out."""
         is_sampled = "discrepancy" not in self.integrated
         return self.discrepancy.size if self.discrepancy and is_sampled else 0
+
+    def priors_given(self, values: Mapping) -> dict[str, Prior]:
+        """Return the priors, that of the force zero given how mountings differ.
+
+        A certificate states the zero of the gauge itself. To it the mean of n tested
+        mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
+        """
+        if not (self.runs and self.zero_stated):
+            return self.priors
+        middle, gauge = self.priors["force_offset"].numbers
+        of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(self.runs)
+        zero = Prior("normal", (middle, jnp.hypot(gauge, of_mean)))
+        return {**self.priors, "force_offset": zero}
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
@@ -123,12 +140,7 @@ def build_problem(
 ) -> Problem:
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
-    Args:
-        case: records and gear.
-        shipped: priors of every effect in the library.
-        effects: in the model; those of scatter change nothing.
-        theory: overrides the gear's theory.
-        structure: of the model; by default decided from the readings.
+    Theory and structure are by default the gear's and that which the readings show.
 
     Raises:
         InputError: an effect lacks its covariates or a prior.
@@ -174,6 +186,7 @@ def build_problem(
         effects=effects,
         rounded=form.rounded,
         correlated=form.correlated,
+        zero_stated=is_stated(case.gear.priors["force_offset"]),
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=tuple(integrated),

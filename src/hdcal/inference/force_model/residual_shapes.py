@@ -26,12 +26,11 @@ class Structure:
     """One shape that noise would rarely have.
 
     Attributes:
-        name: what they depend on.
+        name: what the residuals depend on.
         p_value: of the t test, adjusted for the number of shapes tried.
-        size_N: RMS of the shape [N].
-        words: one sentence for people.
-        coefficient: of the shape's column [N]; NaN of what has none.
-        error: standard error of it [N].
+        size_N: root mean square of the shape.
+        words: one sentence.
+        coefficient: of the shape's column [N], with its standard error; else NaN.
     """
 
     name: str
@@ -61,12 +60,7 @@ class Whitened:
 
 
 class Correlated(NamedTuple):
-    """Noise whose neighbours may be correlated.
-
-    Attributes:
-        before: index of the row before each in its run, −1 for none, shape (n,).
-        prior: of their correlation.
-    """
+    """Noise whose neighbours may be correlated: previous rows, and a prior."""
 
     before: np.ndarray
     prior: Prior
@@ -149,7 +143,7 @@ def find_structure(
     Args:
         data: residuals, sensitivities and shapes.
         sd: noise sd of each row [N].
-        noise: how neighbours may be correlated; None where they are not in the model.
+        noise: how neighbours may be correlated, if they may.
         looks: number of searches for the same shapes.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed

@@ -32,7 +32,7 @@ from hdcal.inference.force_model.serial_correlation import (
 )
 from hdcal.inference.force_model.values import predict_rows
 from hdcal.inference.posterior import Posterior
-from hdcal.quantities import FORCE, Quantities
+from hdcal.quantities import Quantities
 
 NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 # Draws that the fitted reading is averaged over: its error is then a tenth of that of
@@ -49,15 +49,10 @@ _WILD, _SHARE, _FEW = 12.0, 0.02, 3
 
 @dataclass(frozen=True)
 class Residuals:
-    """Measured against fitted, row by row; the fit is the posterior mean reading.
+    """Measured less fitted, row by row; the fit is the posterior mean reading.
 
     Attributes:
-        deformation: as read [mm].
-        temperature: of the specimen [°C].
-        direction: sign of the last movement.
-        run: index of the run.
-        measured: force as read [N].
-        fitted: mean reading [N].
+        records: the rows.
         residual: measured − fitted [N].
         standardised: residual over the noise sd [-].
         structure: shapes that noise would rarely show.
@@ -65,31 +60,26 @@ class Residuals:
         units: names and units of what was measured.
     """
 
-    deformation: np.ndarray
-    temperature: np.ndarray
-    direction: np.ndarray
-    run: np.ndarray
-    measured: np.ndarray
-    fitted: np.ndarray
+    records: Records
     residual: np.ndarray
     standardised: np.ndarray
     structure: tuple[Structure, ...]
     noise: tuple[Structure, ...]
-    units: Quantities = FORCE
+    units: Quantities
 
 
 def residuals(posterior: Posterior) -> Residuals:
     """Return the residuals of a calibration and the shapes found in them."""
     problem, records = posterior.problem, posterior.case.records
-    measured, units = np.asarray(records.force), posterior.case.units
-    padded = pad_records(records)
+    padded, units = pad_records(records), posterior.case.units
     columns = discrepancy_columns(problem.discrepancy, padded)
     every = max(len(posterior.draws["K"]) // _DRAWS, 1)
     thinned = {name: values[::every] for name, values in posterior.draws.items()}
-    fitted = np.asarray(_fit(problem, thinned, padded, columns))[: len(measured)]
+    fitted = np.asarray(_fit(problem, thinned, padded, columns))
+    residual = np.asarray(records.force) - fitted[: len(records.force)]
     centre = posterior.median
     near = linearise(problem, centre, records)
-    whitened = _whiten(posterior, near, measured - fitted)
+    whitened = _whiten(posterior, near, residual)
     noise = None
     if problem.correlated:
         noise = Correlated(previous_rows(records), problem.priors[CORRELATION])
@@ -105,14 +95,9 @@ def residuals(posterior: Posterior) -> Residuals:
         correlation=float(centre.get(CORRELATION, 0.0)),
     )
     return Residuals(
-        deformation=np.asarray(records.deformation),
-        temperature=np.asarray(records.temperature),
-        direction=np.asarray(records.sense),
-        run=np.asarray(records.run),
-        measured=measured,
-        fitted=fitted,
-        residual=measured - fitted,
-        standardised=(measured - fitted) / near.sd,
+        records=records,
+        residual=residual,
+        standardised=residual / near.sd,
         structure=tuple(replace(s, words=units.say(s.words)) for s in structure),
         noise=tuple(replace(s, words=units.say(s.words)) for s in faults),
         units=units,
@@ -133,7 +118,7 @@ def _fit(problem, values, records, columns):
 def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
     """Return residuals, sensitivities and shapes in noise and prior sds."""
     case, centre = posterior.case, posterior.median
-    sd, priors = near.sd, posterior.priors
+    sd, priors = near.sd, posterior.effective_priors
     columns, pull = [near.members], [*-near.place]
     for name, slope in near.slopes.items():
         mean, prior_sd = moments(priors[name], name)
@@ -187,14 +172,13 @@ def noise_faults(
     if len(sd) < _LEAST_ROWS:
         return ()
     before = previous_rows(records)
-    follows = before >= 0
     # Squares of correlated errors come in waves, which pass for growth.
     left = _independent(data, before, correlation)
     tests = [_scatter(left, records, sd)]
     if not (rounded or mixed):
-        added = sd * np.sqrt(1.0 - correlation**2 * follows)
+        added = sd * np.sqrt(1.0 - correlation**2 * (before >= 0))
         tests.append(_wild(left, records, added))
-    if not rounded and follows.any():
+    if not rounded and np.any(before >= 0):
         tests.append(_neighbours(left, before, sd, correlation))
     adjusted = [replace(t, p_value=min(1.0, t.p_value * len(tests))) for t in tests]
     return tuple(test for test in adjusted if test.p_value <= FALSE_ALARM)

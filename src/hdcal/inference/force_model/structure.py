@@ -72,11 +72,8 @@ def decide_structure(
 ) -> ModelStructure:
     """Return the structure that the readings of a case show.
 
-    Args:
-        case: records and gear.
-        effects: in the model. What they explain cannot be distinguished from a bend
-            here, so that with effects a leftover is in the model only on request.
-        with_gap: whether the leftover discrepancy is in the model; None decides.
+    What effects explain cannot be distinguished from a bend here, so that with effects
+    a leftover is in the model only on request, by `with_gap`.
     """
     noise_sd = pilot_fit(case.records).noise_sd
     base = base_model(case.records, "bend" if effects else "line")
@@ -173,13 +170,8 @@ def _log_chances(
     """Yield log probabilities of the rows, up to a constant.
 
     Coefficients of the base, noise and weights of the leftover are integrated out.
-
-    Args:
-        gram: products of the whitened columns: base, leftover, force.
-        width: number of columns of the base.
-        rows: number of rows.
-        scales: prior sd of each weight of the leftover for a size of one, at each of
-            its lengths; empty without a leftover.
+    `gram` has the products of the whitened columns: base, leftover, force; `scales` the
+    prior sd of each weight of the leftover for a size of one, at each of its lengths.
     """
     base, cross, rest = gram[:width, :width], gram[:width, width:], gram[width:, width:]
     rest = rest - cross.T @ np.linalg.solve(base, cross)

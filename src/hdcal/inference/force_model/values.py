@@ -65,15 +65,10 @@ def stiffness(problem: "Problem", values: Values) -> Float[Array, ""]:
 
 
 def member_base(problem: "Problem", values: Values, run=None, specimen=None) -> Base:
-    """Return the base parameters of given runs and specimens, as read.
+    """Return the base parameters of runs and specimens by their indices, as read.
 
-    Deviations that are not among the values (integrated out) count as zero.
-
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        run: run indices, or None for the mean of the tested runs.
-        specimen: specimen indices, or None likewise.
+    None stands for the mean of the tested ones. Deviations that are not among the
+    values (integrated out) count as zero.
     """
     scale, offset = values["K"] * values["E0"] * problem.unit_stiffness, 0.0
     scale = as_read(values, scale)

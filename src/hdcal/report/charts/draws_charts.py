@@ -30,7 +30,7 @@ def prior_chart(posterior: Posterior) -> Chart:
 def _density_panel(posterior: Posterior, name: str) -> Panel:
     shown, factor = unit_of(posterior, name)
     draws = posterior.draws[name]
-    prior: Any = frozen(posterior.priors[name], name)
+    prior: Any = frozen(posterior.effective_priors[name], name)
     from_data = posterior.diagnoses[name].driven_by == "data"
     marks: list[Mark] = []
     # Without the long tails of the prior.
