@@ -93,7 +93,7 @@ def test_the_report_asks_nothing_of_the_network(calibrated: Calibrated):
     assert sources and all(s.startswith("data:image/svg+xml;base64,") for s in sources)
     assert not re.search(r"<script[^>]*src|<link|@import|url\(", page, re.I)
     # One script for each figure is data, the other one is allowed by its hash alone.
-    assert len(re.findall(r"<script", page)) == 5
+    assert len(re.findall(r"<script", page)) == 3
     policy = re.search(r'Policy" content="([^"]*)"', page)
     assert policy and "unsafe" not in policy[1] and "script-src 'sha256-" in policy[1]
     for words in ("0.13", "article", "driven by", "SHA-256", "Next step"):

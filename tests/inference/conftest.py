@@ -2,7 +2,6 @@
 
 from effect_records import (  # noqa: F401
     base,
-    differences,
     gear,
     loading,
     reading,

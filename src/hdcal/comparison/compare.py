@@ -104,7 +104,7 @@ def compare(
         NotUsable: a result failed its checks.
     """
     with Findings() as wrong:
-        wrong += implausible("tolerance", tolerance, "rate")
+        wrong += implausible("tolerance", tolerance, "spring_stiffness")
         if len(results) < 2:
             words, remedy = "two or more are compared", "Give another result"
             wrong.append(Finding("results", words, remedy))
