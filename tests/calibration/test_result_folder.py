@@ -112,7 +112,7 @@ def test_a_failed_calibration_is_marked_everywhere(here: Hdcal, tmp_path: Path):
     assert mark in (folder / "calibration.svg").read_text("utf-8")
     page = (folder / "report.html").read_text("utf-8")
     images = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)
-    assert len(images) == 4
+    assert len(images) == 3
     assert all(mark in base64.b64decode(image).decode() for image in images)
     with (folder / "bands.csv").open() as stream:
         assert {row["usable"] for row in csv.DictReader(stream)} == {"false"}

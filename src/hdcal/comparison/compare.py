@@ -131,7 +131,10 @@ def _compared(named, draws, first, tolerance: float | None) -> Compared:
     (name, models), apart = named, draws - first
     # Those of the noise do not change the stiffness.
     effects = {
-        label(e.name) for one in models for e in one.effects if e.stage != "noise"
+        label(e.name)
+        for one in models
+        for e in one.posterior.effects
+        if e.stage != "noise"
     }
     case = models[0].posterior.case
     beyond = None if tolerance is None else float(np.mean(np.abs(apart) > tolerance))
