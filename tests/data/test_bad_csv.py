@@ -152,12 +152,9 @@ def test_missing_files_are_reported_together(tmp_path):
     assert len(findings_of("no\0where.csv", tmp_path / "b.toml")) == 2
 
 
-def test_sizes_need_a_gear_file(folder):
+def test_a_folder_is_a_case_of_two_files(folder):
     (folder / "gear.toml").unlink()
     (folder / "data.csv").write_text(H)
-    first, second = findings_of(folder / "data.csv", theory="ring")
-    assert "rows" in first.problem and "`gear`" in second.remedy
-    # A folder is a case of two files.
     assert "does not exist" in findings_of(folder)[1].problem
 
 

@@ -31,11 +31,7 @@ def pages() -> dict[str, Traversable]:
 
 
 def _shipped(name: str) -> Traversable:
-    """Return a folder of the installed package, or of a checkout.
-
-    Raises:
-        FileNotFoundError: there is none.
-    """
+    """Return a folder of the installed package, or of a checkout."""
     # pathlib.Path and zipfile.Path both know their parent; Traversable does not.
     data: Any = files("hdcal.data")
     package = data.parent

@@ -11,11 +11,9 @@ _NOTHING = 1e-8
 
 
 def require_scatter(case: Case) -> None:
-    """Refuse readings without scatter, where nothing else states their noise.
+    """Raise InputError for readings on straight lines to the last digit.
 
-    Raises:
-        InputError: they lie on straight lines to the last digit, and neither the step
-            of the display nor an sd of any row is stated.
+    Not where the step of the display or the sd of a row is stated.
     """
     records = case.records
     if case.gear.force_resolution > 0.0 or np.any(np.asarray(records.force_sd) > 0.0):

@@ -101,19 +101,12 @@ _LONGEST = 60
 
 
 class Unit(NamedTuple):
-    """Unit of a column.
-
-    Attributes:
-        name: its usual spelling.
-        dimension: a key of `SIZES`.
-        size: in the first unit of that dimension.
-        zero: reading in this unit at the zero of that one.
-    """
+    """Unit of a column; the dimension is a key of `SIZES`."""
 
     name: str
     dimension: str
-    size: float
-    zero: float = 0.0
+    size: float  # in the first unit of the dimension
+    zero: float = 0.0  # reading in this unit at the zero of that one
 
     def convert(self, values: np.ndarray) -> np.ndarray:
         """Convert values, shape (n,), into mm, N, N*m, rad, s or °C."""
@@ -147,11 +140,9 @@ def unit_names(dimension: str) -> list[str]:
 
 
 def to_code(unit: str) -> tuple[float, str]:
-    """Read a unit such as `GPa`, `1e-4/K` or `N*s/mm^2`; a degree is a difference.
+    """Return the factor to code units of a unit such as `N*s/mm^2`, and their name.
 
-    Returns:
-        The factor that takes a number in `unit` to code units, and the name of
-        that code unit (`MPa`, `1/K`, ...; `1` when dimensionless).
+    A degree is a difference. The name is `MPa`, `1/K`, ...; `1` when dimensionless.
 
     Raises:
         UnitError: the text is not a product of known mechanical units.

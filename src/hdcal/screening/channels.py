@@ -18,12 +18,7 @@ _PACE = 0.5
 
 
 def saturated_rows(held: np.ndarray, moving: np.ndarray) -> np.ndarray:
-    """Return rows at which a channel stands at its largest or smallest reading.
-
-    Args:
-        held: the channel that may be saturated, shape (n,).
-        moving: the other one, shape (n,).
-    """
+    """Return rows at which a channel stands at its largest or smallest reading."""
     steps = np.diff(np.unique(held))
     if not steps.size or np.min(steps) > _DIGITS * np.ptp(held):
         return np.array([], int)

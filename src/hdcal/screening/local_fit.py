@@ -28,15 +28,10 @@ _ODDS = 5.0
 
 @dataclass(frozen=True)
 class Usual:
-    """What a statistic usually is in this record: Student's t about zero.
-
-    Attributes:
-        scale: in the unit of the statistic.
-        dof: degrees of freedom; few where the tail is heavy.
-    """
+    """What a statistic usually is in this record: Student's t about zero."""
 
     scale: float
-    dof: float
+    dof: float  # degrees of freedom; few where the tail is heavy
 
     @classmethod
     def of(cls, values: np.ndarray, least: float) -> "Usual":

@@ -51,18 +51,13 @@ Stretches = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True)
 class Observation:
-    """One finding in the record.
+    """One finding in the record, and what was done about it.
 
     Attributes:
-        kind: kind of the finding.
         rows: first and last row of each stretch that it concerns, from 0.
-        size: its size, in `unit`.
-        unit: unit of the size.
-        action: what was done about it.
-        run: index of the run.
+        size: in `unit`.
         where: the rows as their file names them.
-        words: the finding in a sentence without a full stop.
-        gear: label of the gear.
+        words: a sentence without a full stop.
     """
 
     kind: Kind
@@ -83,23 +78,14 @@ class Observation:
 
 @dataclass(frozen=True)
 class StraightPart:
-    """The longest straight part of the largest movement of a run.
+    """The longest straight part of the largest movement of a run."""
 
-    Attributes:
-        low: smallest deformation, as read [mm].
-        high: largest deformation, as read [mm].
-        rows: rows of the part, without those of other branches, shape (n,).
-        slope: slope of the force over the deformation, by least squares [N/mm].
-        slope_sd: its standard error [N/mm].
-        whole: whether every movement of the run is straight.
-    """
-
-    low: float
+    low: float  # smallest and largest deformation, as read [mm]
     high: float
-    rows: np.ndarray
-    slope: float
-    slope_sd: float
-    whole: bool
+    rows: np.ndarray  # mask without rows of other branches, shape (n,)
+    slope: float  # of the force over the deformation, by least squares [N/mm]
+    slope_sd: float  # its standard error [N/mm]
+    whole: bool  # whether every movement of the run is straight
 
 
 @dataclass(frozen=True)
@@ -107,16 +93,13 @@ class Screening:
     """A record after screening; arrays have the shape (n,).
 
     Attributes:
-        observations: findings in the order of the record.
-        segment: index into `SEGMENTS` of each row.
-        kept: which rows stay in the record.
+        segment: index into `SEGMENTS`.
         deformation: with each jump of its zero taken out [mm].
         force: likewise, turned where its sign was opposite [N].
         zero: number of jumps of a zero before each row in its run.
         deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
         trembling: whether that scatter hides the direction of the movement.
-        straight: longest straight part of a single run; None of several runs, and where
-            too few rows are left.
+        straight: of a single run with rows enough.
         working_range: in words; empty where none is stated.
         straight_in_range: longest straight part within a range chosen by its ends.
     """
@@ -162,7 +145,7 @@ class Screening:
     @property
     def asked(self) -> tuple[Observation, ...]:
         """Findings that only the user can decide about."""
-        return tuple(one for one in self.observations if one.action == "asked")
+        return tuple(o for o in self.observations if o.action == "asked")
 
 
 def stretches(rows: np.ndarray | Sequence[int]) -> Stretches:

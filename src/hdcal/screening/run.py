@@ -37,35 +37,25 @@ _JUMPS: dict[str, tuple[Kind, str]] = {
 class Run:
     """One run on its way through the screening; arrays are of its rows, shape (r,).
 
-    Attributes:
-        index: index of the run.
-        rows: its rows in the whole record, in order.
-        x: deformation, with each jump of its zero taken out.
-        y: force, likewise.
-        segment: index into `SEGMENTS`.
-        kept: which rows stay.
-        zero: number of jumps before each row.
-        scatter: sd of the deformation's reading; 0 where none shows.
-        plain: whether a straight line explains it.
-        observations: findings so far.
+    Attributes as in `Screening`; x and y are deformation and force.
     """
 
     index: int
-    rows: np.ndarray
+    rows: np.ndarray  # in the whole record
     x: np.ndarray
     y: np.ndarray
     segment: np.ndarray
     kept: np.ndarray
     zero: np.ndarray
-    scatter: float = 0.0
-    plain: bool = False
+    scatter: float = 0.0  # sd of the deformation's reading; 0 where none shows
+    plain: bool = False  # whether a straight line explains it
     observations: list[Observation] = field(default_factory=list)
 
     @classmethod
     def of(
         cls, rows: np.ndarray, x: np.ndarray, y: np.ndarray, index: int = 0
     ) -> "Run":
-        """Return rows of a record with deformation x and force y, (n,), all kept."""
+        """Return some rows of a record, all kept."""
         segment, zero = np.zeros((2, rows.size), int)
         kept = np.ones(rows.size, bool)
         return cls(index, rows, x[rows], y[rows], segment, kept, zero)
@@ -75,8 +65,8 @@ class Run:
     ) -> None:
         """Add an observation of some rows of the run."""
         where = stretches(self.rows[rows])
-        found = Observation(kind, where, float(size), unit, action, self.index)
-        self.observations.append(found)
+        observed = Observation(kind, where, float(size), unit, action, self.index)
+        self.observations.append(observed)
 
     def cut(self, rows: np.ndarray, segment: int) -> None:
         """Take rows out of the record."""

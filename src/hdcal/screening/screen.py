@@ -44,8 +44,8 @@ def screen(
 
     Args:
         deformation: as read [mm], in the order it was taken, shape (n,).
-        force: as read [N], shape (n,).
-        run: index of the mounting, shape (n,); by default one.
+        force: as read [N].
+        run: index of the mounting; by default one.
         whole: whether these are all runs. Of some of them nobody knows whether the sign
             is opposite in every run, so that it is asked about and not turned.
         wanted: working range. Where force and deformation grow together in it, the sign

@@ -28,17 +28,11 @@ _FEWEST_FOR_MEMORY = 10 * _PIECES
 
 
 class Straight(NamedTuple):
-    """The longest straight part of a movement.
+    """The longest straight part of a movement."""
 
-    Attributes:
-        rows: rows of the movement.
-        whole: whether it is the whole curve.
-        inflation: factor on the variance of its slope, by correlated neighbours.
-    """
-
-    rows: slice
-    whole: bool
-    inflation: float = 1.0
+    rows: slice  # of the movement
+    whole: bool  # whether it is the whole curve
+    inflation: float = 1.0  # of the variance of its slope, by correlated neighbours
 
 
 def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Straight:

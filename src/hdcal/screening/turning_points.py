@@ -20,9 +20,9 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
 
 
 def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
-    """Return rows at which the movement reverses by more than a threshold.
+    """Return rows at which x reverses by more than a threshold, and the first sign.
 
-    And the sign of the first movement, 0 where x never moves by the threshold.
+    The sign is 0 where x never moves by the threshold.
     """
     # Only rows where the difference changes sign can be reversals, so the loop,
     # which has to be sequential, sees those alone.
@@ -62,11 +62,7 @@ def resting(rising: np.ndarray, tolerance: float) -> np.ndarray:
 
     A level is a hold where four times the tolerance contains hardly more rows than the
     tolerance itself: on a ramp it contains four times as many, at the smooth top of a
-    sine twice as many.
-
-    Args:
-        rising: monotone envelope of the movement [mm], shape (n,).
-        tolerance: spread of the readings inside a hold [mm].
+    sine twice as many. `rising` is the monotone envelope.
     """
     near = _rows_within(rising, tolerance / 2)
     return (near >= 2) & (_rows_within(rising, 2 * tolerance) < 1.5 * near)

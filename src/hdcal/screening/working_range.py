@@ -28,19 +28,13 @@ STRAIGHT = "straight"
 
 @dataclass(frozen=True)
 class WorkingRange:
-    """Ends of the working range.
-
-    Attributes:
-        low: lower end.
-        high: upper end.
-        unit: mm of the deformation as read, % of the largest force of a run, or
-            `straight` where the longest straight part sets the ends.
-        one_branch: whether rows of other branches lie between the ends, and are cut.
-    """
+    """Ends of the working range."""
 
     low: float
     high: float
+    # Of the deformation as read, the largest force of a run, or the straight part.
     unit: Literal["mm", "%", "straight"]
+    # Whether rows of other branches lie between the ends, and are cut.
     one_branch: bool = False
 
     def words(self, units: Quantities) -> str:
@@ -63,11 +57,7 @@ class WorkingRange:
 
 
 def read_range(text: str) -> WorkingRange:
-    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force, `straight` or `all`.
-
-    Raises:
-        ValueError: it is neither; the words say why.
-    """
+    """Read LOW:HIGH in mm or %, `straight` or `all`; or raise ValueError with words."""
     if text.strip() in ("all", STRAIGHT):
         unit = "mm" if text.strip() == "all" else STRAIGHT
         return WorkingRange(-math.inf, math.inf, unit)

@@ -7,9 +7,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel
 
-from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear_file.validation import STRICT, within
-from hdcal.data.prior import Prior
+from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.screening.turning_points import TURN_MOST, turning_points
 
@@ -68,12 +67,7 @@ def correlation_prior(
 
     White noise behind a filter of first order is correlated by e^(−2π f Δt). Where
     that is little nothing is known: other causes may correlate errors for longer.
-
-    Args:
-        cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
-        deformation: in the order it was taken [mm], shape (n,).
-        run: index of the mounting, shape (n,).
-        time: time of the readings [s], shape (n,); None where it was not measured.
+    The cutoff f [Hz] is that of the rig's low-pass filter; time [s], shape (n,).
     """
     steps = np.diff(time) if cutoff is not None and time is not None else np.array([])
     if cutoff is not None and np.any(steps > 0.0):
@@ -91,8 +85,8 @@ def rows_of_half_cycle(deformation: np.ndarray, run: np.ndarray) -> float:
     lengths: list[int] = []
     order = np.argsort(run, kind="stable")
     cuts = np.flatnonzero(np.diff(run[order])) + 1
-    for own in np.split(deformation[order], cuts):
-        span = float(np.ptp(own))
-        turns = turning_points(own, TURN_MOST * span)[0] if span > 0.0 else ()
-        lengths += np.diff([0, *turns, len(own)]).tolist()
+    for x in np.split(deformation[order], cuts):
+        span = float(np.ptp(x))
+        turns = turning_points(x, TURN_MOST * span)[0] if span > 0.0 else ()
+        lengths += np.diff([0, *turns, len(x)]).tolist()
     return float(np.median(lengths))

@@ -106,21 +106,17 @@ def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
     return MeasurementTable.model_validate(table.get("measurement", {})).certificates
 
 
-def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
-    """Return sizes that are missing, and relations between those that are there.
-
-    Checked whatever else is wrong.
-    """
+def size_findings(toml: TomlFile) -> list[Finding]:
+    """Return sizes that are missing, and relations between those that are there."""
     table = toml.table.get("gear")
     if not isinstance(table, dict):
         return []
-    missing = [name for name in SIZES_NEEDED if name not in table]
+    needed = () if table.get("theory") == SPRING else SIZES_NEEDED
     other = f"; or take the theory '{SPRING}', which needs none"
-    if (theory or table.get("theory")) == SPRING:
-        missing = []
     findings = [
         toml.finding("is missing", f"Add it: {name} = …{other}", f"gear.{name}")
-        for name in missing
+        for name in needed
+        if name not in table
     ]
     numbers = {
         name.removesuffix("_mm"): value

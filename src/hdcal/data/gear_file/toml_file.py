@@ -1,27 +1,25 @@
-"""A TOML file, with findings on its keys."""
+"""Read TOML files, with findings on their keys, and write gear files."""
 
+import json
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from hdcal.data.regular_file import why_not_readable
+from hdcal.data.findings import why_not_readable
 from hdcal.errors import Finding, InputError
 
 _LARGEST = 1 << 20
+_NAME = 200  # letters of a gear's name, as the schema takes them
 _PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
 
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A parsed TOML file.
-
-    Attributes:
-        file: its name, as the user gave it.
-        table: its content.
-    """
+    """A parsed TOML file, and its name as the user gave it."""
 
     file: str
     table: dict
@@ -36,11 +34,7 @@ class TomlFile:
 
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
-    """Read and parse a TOML file.
-
-    Raises:
-        InputError: missing, unreadable, too large, or not TOML.
-    """
+    """Read a TOML file; raise InputError where it is none."""
 
     def refusal(problem: str, remedy: str, row: int | None = None) -> InputError:
         return InputError([Finding(file, problem, remedy, row)])
@@ -76,3 +70,18 @@ def did_you_mean(name: str, known: list[str]) -> str:
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
     hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
     return f"{hint}Known are: {', '.join(known)}"
+
+
+def gear_text(tables: Mapping[str, Mapping[str, str | float]]) -> str:
+    """Return the text of a gear file of these tables."""
+    lines = []
+    for table, rows in tables.items():
+        lines += [f"[{table}]"] if rows else []
+        for key, value in rows.items():
+            if key == "name":
+                # Of a file, whose name may hold anything.
+                value = "".join(c for c in str(value) if c.isprintable())[:_NAME]
+            # A text in TOML's quotes is written as in JSON.
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+        lines += [""] if rows else []
+    return "\n".join(lines)

@@ -33,23 +33,14 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class Column:
-    """A column that is used.
-
-    Attributes:
-        quantity: one of QUANTITIES.
-        header: as written in the file.
-        position: 0 = first column.
-        unit: unit of its numbers; None for labels.
-        guessed: whether its header is not spelt `quantity_unit`.
-        against: another unit, which its header names itself.
-    """
+    """A column that is used."""
 
     quantity: str
     header: str
-    position: int
-    unit: Unit | None = None
-    guessed: bool = False
-    against: str = ""
+    position: int  # 0 = first column
+    unit: Unit | None = None  # None of labels
+    guessed: bool = False  # its header is not spelt `quantity_unit`
+    against: str = ""  # another unit, which its header names itself
 
 
 def choose_columns(
@@ -62,17 +53,8 @@ def choose_columns(
     """Return each quantity's column by its header, or as the user named it.
 
     Where deformation and force are required and the source holds torques and no forces,
-    these are angle and torque.
-
-    Args:
-        table: the readings with their headers.
-        mapping: quantity -> header with the unit in square brackets.
-        quantities: quantities to look for.
-        required: those that must be there.
-        findings: receives one for each header that is wrong or missing.
-
-    Raises:
-        InputError: there are no headers, and the user names no column by its number.
+    these are angle and torque. The mapping is from quantities to headers with the unit
+    in square brackets, or to numbers of columns.
     """
     _check_names(table, mapping, findings)
     chooser = _Chooser(table, findings)
@@ -142,7 +124,7 @@ def _check_names(
 
 
 class _Chooser:
-    """Choice of one column after the other; what is wrong is added to the findings."""
+    """Choice of one column after the other, with findings on what is wrong."""
 
     def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings

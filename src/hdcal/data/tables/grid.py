@@ -16,17 +16,11 @@ SEPARATORS = "\t;|,"
 
 
 class SourceLine(NamedTuple):
-    """A row of a source that is no reading, or not yet known to be one.
+    """A row of a source that is no reading, or not yet known to be one."""
 
-    Attributes:
-        row: its number in the source, 1 = first.
-        cells: texts without blanks around them.
-        fits: whether it is a row of the grid, as readings are.
-    """
-
-    row: int
-    cells: list[str]
-    fits: bool
+    row: int  # 1 = first
+    cells: list[str]  # without blanks around them
+    fits: bool  # whether it is a row of the grid, as readings are
 
     @property
     def first(self) -> str:
@@ -124,10 +118,6 @@ def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
     """Return the grid of a DataFrame below a row of its names.
 
     Columns that are only counted have no headers: they are asked for by number.
-
-    Args:
-        frame: the readings.
-        first: number of its first row.
     """
     names = [str(name) for name in frame.columns]
     counted = all(name.isdigit() for name in names)
@@ -138,11 +128,7 @@ def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
 
 
 def memory_grid(data: Any, findings: FileFindings) -> tuple[Grid, str]:
-    """Return the grid of a table in memory, and the hash of its cells.
-
-    Raises:
-        InputError: arrays of several lengths or dimensions; headers of several levels.
-    """
+    """Return the grid of a table in memory, and the hash of its cells."""
     if hasattr(data, "to_pandas"):
         data = data.to_pandas()
     try:

@@ -81,23 +81,14 @@ _ADVICE = {
 
 
 class Header(NamedTuple):
-    """What a header means.
+    """What a header means."""
 
-    Attributes:
-        quantity: that its words name; empty where they name none.
-        unit_text: its unit as written; empty without one.
-        unit: that unit; None where it is none of a quantity.
-        exact: it is spelt `quantity_unit`.
-        whole: it names the quantity and nothing else.
-        excluded: it names something else about a quantity, such as a rate.
-    """
-
-    quantity: str
-    unit_text: str
-    unit: Unit | None
-    exact: bool
-    whole: bool
-    excluded: bool
+    quantity: str  # empty where its words name none
+    unit_text: str  # its unit as written; empty without one
+    unit: Unit | None  # None where that is none of a quantity
+    exact: bool  # it is spelt `quantity_unit`
+    whole: bool  # it names the quantity and nothing else
+    excluded: bool  # it names something else about a quantity, such as a rate
 
     def measures(self, quantity: str) -> bool:
         """Tell whether its unit is one of a quantity."""

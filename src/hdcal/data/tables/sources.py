@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from hdcal.data.findings import FileFindings
-from hdcal.data.regular_file import why_not_readable
+from hdcal.data.findings import FileFindings, why_not_readable
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.grid import memory_grid
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
@@ -42,13 +41,7 @@ def read_source(
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> tuple[ReadTable, str]:
-    """Return the table of a file, or of a table in memory, and the hash of its source.
-
-    Args:
-        data: a path, a DataFrame, or arrays by name.
-        findings: findings on the source.
-        encoding: encoding of a text; by default the likeliest.
-        sheet: sheet of a workbook; by default the only one with readings.
+    """Return the table of a file, a DataFrame or arrays by name, and its hash.
 
     Raises:
         InputError: it holds no table, or it is not clear which one is meant.

@@ -36,11 +36,7 @@ _GAP = re.compile(r"\s{2,}")
 
 
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
-    """Return the bytes of a text.
-
-    Raises:
-        InputError: the file is binary, or has a line over 1 MiB.
-    """
+    """Return the bytes of a text without binary content or endless lines."""
     raw = path.read_bytes()
     if not (wide or raw.startswith(_WIDE_MARKS)) and b"\0" in raw:
         findings.refuse("is a binary file", "Save it as UTF-8 text")
@@ -54,11 +50,7 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
 def decode(
     raw: bytes, findings: FileFindings, encoding: str | None
 ) -> tuple[str, list[str]]:
-    """Return a text with plain newlines, and notes on its encoding.
-
-    Raises:
-        InputError: they are no text in it, or a web page.
-    """
+    """Return a text with plain newlines, and notes on its encoding."""
     likely = encoding or _likely(raw)
     try:
         text = raw.decode(likely)
@@ -175,10 +167,7 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
 
 
 def _numbers(cells: list[str]) -> tuple[int, float] | None:
-    """Return the number of cells of a line, and the share of numbers among filled ones.
-
-    None of a line with fewer than two numbers.
-    """
+    """Return cells and share of numbers of a line; None with fewer than two numbers."""
     numbers = sum(map(is_number, cells))
     return (len(cells), numbers / sum(map(bool, cells))) if numbers >= 2 else None
 

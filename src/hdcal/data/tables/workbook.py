@@ -21,11 +21,7 @@ _FEWEST = 5
 def sheet_grid(
     path: Path, findings: FileFindings, sheet: str | None
 ) -> tuple[Grid, list[str]]:
-    """Return a sheet, by default the only one with readings, and a note on the choice.
-
-    Raises:
-        InputError: it is no workbook, or it is not clear which sheet is meant.
-    """
+    """Return a sheet, by default the only one with readings, and a note on that."""
     sheets = _sheets(path, findings)
     names = ", ".join(map(quoted, sheets))
     if sheet is not None:
