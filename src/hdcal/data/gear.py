@@ -132,7 +132,6 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
 
 
 def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
-    """Return a table of the gear file, or an empty one."""
     table = toml.table.get(name)
     return table if isinstance(table, dict) else {}
 

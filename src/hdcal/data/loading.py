@@ -13,6 +13,7 @@ from hdcal.screening.turning_points import (
     envelope,
     noise_sd,
     resting,
+    rows_of_runs,
     turning_points,
 )
 
@@ -105,10 +106,8 @@ def derive_motion(
     direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)
     if hidden:
         return Motion(sense, sense, rate, frozenset())
-    order = np.argsort(run, kind="stable")
-    cuts = np.flatnonzero(np.diff(run[order])) + 1
     moves: list[list[_Move]] = []
-    for rows in np.split(order, cuts):
+    for rows in rows_of_runs(run):
         clock = None if time is None else time[rows]
         moves.append(_one_run(deformation[rows], clock, rows, direction, rate))
         if moves[-1]:

@@ -109,7 +109,6 @@ _NUMBERS: dict[str, Any] = {
 
 
 def _entry_of(numbers: tuple[str, ...]) -> type[_Entry]:
-    """Return the model of the entries of a family with these numbers."""
     fields: dict[str, Any] = {n: (_NUMBERS.get(n, float), ...) for n in numbers}
     return create_model("Entry", __base__=_Entry, **fields)
 

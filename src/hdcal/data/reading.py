@@ -106,7 +106,6 @@ def asked_columns(
 
 
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
-    """Return the name of the case, or of its folder, after file and parts."""
     name = (data.resolve().name if folder else data.stem) or "case"
     texts = (str(part).strip() for part in parts if part is not None)
     return "-".join([name, *(_NO_NAME.sub("_", text) for text in texts)])

@@ -31,7 +31,6 @@ def pages() -> dict[str, Traversable]:
 
 
 def _shipped(name: str) -> Traversable:
-    """Return a folder of the installed package, or of a checkout."""
     # pathlib.Path and zipfile.Path both know their parent; Traversable does not.
     data: Any = files("hdcal.data")
     package = data.parent

@@ -1,12 +1,13 @@
-"""Whether readings scatter at all, and the least that they can."""
+"""Whether readings scatter at all, and the step of their display."""
 
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
 from hdcal.errors import Finding, InputError
+from hdcal.screening.local_fit import least_step
 
-# Shares of the range of forces that are no more than rounding of what was computed.
+# Share of the forces that is no more than rounding of what was computed.
 _NOTHING = 1e-8
 
 
@@ -33,15 +34,7 @@ def require_scatter(case: Case) -> None:
 
 def reading_step(case: Case) -> float:
     """Return the step of the force display, or else `least_step` [N]."""
-    return case.gear.force_resolution or least_step(case.records.force)
-
-
-def least_step(force) -> float:
-    """Return the least difference of two forces [N]; zero where all are the same."""
-    force = np.asarray(force)
-    steps = np.diff(np.unique(force))
-    steps = steps[steps > _NOTHING * np.max(np.abs(force))] if len(steps) else steps
-    return float(np.min(steps)) if len(steps) else 0.0
+    return case.gear.force_resolution or least_step(np.asarray(case.records.force))
 
 
 def left_of_lines(records: Records, values: np.ndarray) -> np.ndarray:

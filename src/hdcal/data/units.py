@@ -184,7 +184,6 @@ def _product(unit: str) -> tuple[float, tuple[int, ...]]:
 
 
 def _factor(part: str, unit: str) -> tuple[float, tuple[int, ...]]:
-    """Scale of one factor, and its powers of the code units."""
     if _NUMBER.fullmatch(part):
         if not float(part) > 0.0:
             raise UnitError(f"'{unit}' has a scale of zero")

@@ -53,7 +53,9 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
         return 0, 0.0, ""
     rows = looked_at(x, y)
     rows = rows[rows > 0]
-    typical = float(median(slopes(*_sample(x, y))[None].reshape(1, -1), 0.0)[0])
+    sample = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
+    near_x, near_y = (windows(values, sample, np.arange(-5, 5)) for values in (x, y))
+    typical = float(median(slopes(near_x, near_y).ravel(), 0.0))
     rise, run = (values[rows] - values[rows - 1] for values in (y, x))
     step = rise - typical * run
     usual = Usual.of(step, resolution(y))
@@ -72,13 +74,6 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
             size = run[place] if zeroed else step[place]
             return int(row), float(size), "mm" if zeroed else "N"
     return 0, 0.0, ""
-
-
-def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return windows of ten rows over the whole record."""
-    rows = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
-    offsets = np.arange(-5, 5)
-    return windows(x, rows, offsets), windows(y, rows, offsets)
 
 
 def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:

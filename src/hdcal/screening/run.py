@@ -83,13 +83,9 @@ class Run:
 
     def with_repeats(self, rows: np.ndarray) -> np.ndarray:
         """Return rows with those after each that just repeat it."""
-        distinct = self.distinct()
-        starts = np.searchsorted(distinct, rows)
-        stops = np.r_[distinct, self.x.size][starts + 1]
-        pairs = zip(rows, stops, strict=True)
-        found = [np.arange(first, stop) for first, stop in pairs]
-        whole = np.concatenate(found) if found else np.array([], int)
-        return whole[self.kept[whole]]
+        kept, distinct = np.flatnonzero(self.kept), self.distinct()
+        first = distinct[np.searchsorted(distinct, kept, "right") - 1]
+        return kept[np.isin(first, rows)]
 
 
 def look_at(one: Run) -> None:

@@ -10,7 +10,7 @@ from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
 from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run, look_at
-from hdcal.screening.turning_points import turning_points
+from hdcal.screening.turning_points import rows_of_runs, turning_points
 from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 
@@ -54,11 +54,9 @@ def screen(
     x, y = np.array(deformation, float), np.array(force, float)
     n = x.size
     index = np.zeros(n, int) if run is None else np.asarray(run)
-    order = np.argsort(index, kind="stable")
-    cuts = np.flatnonzero(np.diff(index[order])) + 1
     runs = []
     plain = plain_runs(x, y, index)
-    for rows in np.split(order, cuts) if n else []:
+    for rows in rows_of_runs(index):
         one = Run.of(rows, x, y, int(index[rows[0]]))
         one.plain = bool(plain[one.index])
         look_at(one)
@@ -70,7 +68,6 @@ def screen(
 
 
 def _gathered(runs: list[Run], n: int) -> Screening:
-    """Return the screened runs as one record."""
     columns = {name: np.zeros(n) for name in ("x", "y", "segment", "kept", "zero")}
     for one in runs:
         for name, values in columns.items():

@@ -19,6 +19,13 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
     return float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * 6**0.5)
 
 
+def rows_of_runs(run: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of each run, given the index of each row's, shape (n,)."""
+    order = np.argsort(run, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(run[order])) + 1)
+    return parts if order.size else []
+
+
 def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
     """Return rows at which x reverses by more than a threshold, and the first sign.
 

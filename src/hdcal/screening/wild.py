@@ -70,7 +70,6 @@ def _comes_back(
 
 
 def _leaves(order: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Tell which rows leave the sequence of one channel."""
     off = residuals(order, values, rows)
     usual = Usual.of(off, resolution(values))
     return np.nan_to_num(np.abs(off)) > _LEAVES * usual.scale

@@ -44,7 +44,7 @@ _CHOOSE = (
     "Check which columns are {load} and {displacement}, and their signs; or choose the "
     "part that is meant by `range`"
 )
-_HIDDEN = (
+HIDDEN = (
     "the scatter of the {displacement} hides the direction of its movement: loading "
     "and unloading cannot be distinguished"
 )
@@ -66,11 +66,6 @@ def question(
     return _sentence(found, labels, units), units.say(_CHOOSE)
 
 
-def hidden_direction(units: Quantities) -> str:
-    """Return that loading and unloading cannot be distinguished."""
-    return units.say(_HIDDEN)
-
-
 def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
     text = units.say(_SENTENCES[found.kind])
     facts = {
@@ -86,7 +81,6 @@ def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
 
 
 def _rows(found: Observation, labels: np.ndarray) -> str:
-    """Return the rows of a finding as their file names them."""
     each = [
         f"{labels[first]}" if first == last else f"{labels[first]}-{labels[last]}"
         for first, last in found.rows[:_LISTED]

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from hdcal.data.gear_file.validation import STRICT, within
 from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.priors import effect_priors, rig_priors
-from hdcal.screening.turning_points import TURN_MOST, turning_points
+from hdcal.screening.turning_points import TURN_MOST, rows_of_runs, turning_points
 
 # Of a pitch by its drawing.
 _PITCH_LOG_SD = 0.02
@@ -83,10 +83,8 @@ def correlation_prior(
 def rows_of_half_cycle(deformation: np.ndarray, run: np.ndarray) -> float:
     """Return the median number of rows between two turns of the loading."""
     lengths: list[int] = []
-    order = np.argsort(run, kind="stable")
-    cuts = np.flatnonzero(np.diff(run[order])) + 1
-    for x in np.split(deformation[order], cuts):
-        span = float(np.ptp(x))
+    for rows in rows_of_runs(run):
+        x, span = deformation[rows], float(np.ptp(deformation[rows]))
         turns = turning_points(x, TURN_MOST * span)[0] if span > 0.0 else ()
         lengths += np.diff([0, *turns, len(x)]).tolist()
     return float(np.median(lengths))

@@ -69,7 +69,6 @@ def requested(kind: type[M], context: Any, **given: Any) -> M:
 def _faults(
     error: ValidationError, kind: type[BaseModel]
 ) -> Iterator[tuple[list[str], str, str]]:
-    """Yield place, problem and remedy of each error."""
     for details in error.errors():
         place = [str(part) for part in details["loc"]]
         yield place, *_words(dict(details), place, kind)

@@ -32,8 +32,7 @@ from hdcal.data.tables.parquet_files import (
     parquet_table,
     plain_columns,
 )
-from hdcal.data.tables.shapes import table_of
-from hdcal.data.tables.sources import file_sha256
+from hdcal.data.tables.sources import file_sha256, table_of
 
 if TYPE_CHECKING:
     from pyarrow import Schema, Table

@@ -14,7 +14,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
-from hdcal.screening.words import hidden_direction, in_words, question
+from hdcal.screening.words import HIDDEN, in_words, question
 from hdcal.screening.working_range import (
     FORM,
     STRAIGHT,
@@ -136,5 +136,5 @@ def screening_notes(result: Screening, units: Quantities) -> list[str]:
     """Return the findings of a screening, each in one sentence."""
     notes = [one.words for one in result.observations]
     more = [f"and {len(notes) - _LISTED} more findings"] if notes[_LISTED:] else []
-    hidden = [hidden_direction(units)] if result.trembling else []
+    hidden = [units.say(HIDDEN)] if result.trembling else []
     return [*notes[:_LISTED], *more, *hidden]

@@ -204,7 +204,6 @@ def _first_heading(
 
 
 def _sample(grid: Grid) -> Grid:
-    """Return the first rows of a grid, and some of the rest."""
     place = np.arange(len(grid.rows))
     later = (place - _SAMPLE) % max(1, len(place) // _SAMPLE) == 0
     return grid.take((place < _SAMPLE) | later)
@@ -259,7 +258,6 @@ def _summaries(words: list[str]) -> np.ndarray:
 def _table(
     grid: Grid, headings: list[Heading], empty: frozenset[int], others: _OtherLines
 ) -> ReadTable:
-    """Return the readings of all blocks under the heading of the first one."""
     main, notes = headings[0], []
     if others.above:
         names = ", ".join(f"'{name}'" for name in main.names)

@@ -222,7 +222,6 @@ class _Chooser:
         return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
 
     def _where(self, fits: Callable[[Header], bool]) -> list[int]:
-        """Return the columns with a fitting header and any cells."""
         headers, empty = enumerate(self._headers), self._table.empty
         return [place for place, h in headers if place not in empty and fits(h)]
 

@@ -74,7 +74,6 @@ def decode(
 
 
 def _likely(raw: bytes) -> str:
-    """Return the likeliest encoding of a text."""
     if raw.startswith(_WIDE_MARKS):
         return "utf-16"
     try:

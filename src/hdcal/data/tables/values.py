@@ -79,7 +79,6 @@ def _is_regular(filled: np.ndarray) -> bool:
 def _numbers(
     table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> dict[str, np.ndarray]:
-    """Return the columns of numbers in the units of the file."""
     numeric = {name: column for name, column in used.items() if name not in LABELS}
     cells = {name: table.grid.read(one.position) for name, one in numeric.items()}
     comma = has_comma(cells.values())

@@ -47,7 +47,6 @@ def _is_table(grid: Grid) -> bool:
 
 
 def _sheets(path: Path, findings: FileFindings) -> dict[str, Grid]:
-    """Return the sheets by name."""
     broken = "is no workbook that can be read"
     try:
         with zipfile.ZipFile(path) as archive:

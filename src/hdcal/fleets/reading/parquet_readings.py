@@ -9,7 +9,7 @@ import pandas as pd
 
 from hdcal.data.loading import derive_motion, sense_at_turns
 from hdcal.data.measurements.case_of import screened_case
-from hdcal.data.measurements.joining import joined
+from hdcal.data.measurements.folder import joined
 from hdcal.data.measurements.labels import further_labels, mountings, run_labels
 from hdcal.data.measurements.measurements import Measurements
 from hdcal.data.measurements.notes import mountings_note
