@@ -106,7 +106,7 @@ def test_bad_table(folder, name):
         ({"force": "Load[N]"}, (1, "Load", "not there")),
         ({"force": "force_N[psi]"}, (1, "force_N", "'psi'")),
         ({"force": "extra"}, (1, "extra", "[UNIT]")),
-        ({"forse": "force_N[N]"}, (None, None, "mean force")),
+        ({"forse": "force_N[N]"}, (None, None, "mean 'force'")),
         ({"time": "force_N[s]"}, (1, "force_N", "both as force and as time")),
         ({"time": "twin[s]"}, (1, "twin", "fits 2 columns")),
     ],

@@ -3,6 +3,7 @@
 import re
 import stat
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NoReturn
 
@@ -70,10 +71,7 @@ class FileFindings(Findings):
 
 
 def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
-    """Return problem and remedy where a file is no finite one, or too large.
-
-    A file that is missing or may not be looked at is left to who opens it.
-    """
+    """Return problem and remedy of a file that is endless or too large."""
     try:
         status = path.stat()
     except (OSError, ValueError):
@@ -87,3 +85,11 @@ def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
         words = f"is larger than {largest // unit} {_UNITS[unit]}"
         return words, "Name another file, or thin this out"
     return None
+
+
+def did_you_mean(name: str, known: list[str]) -> str:
+    """Return a remedy with the likeliest meaning of an unknown name, and all known."""
+    by_lower = {item.lower(): item for item in known}
+    near = get_close_matches(name.lower(), by_lower, 1, 0.5)
+    hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
+    return f"{hint}Known are: {', '.join(known)}"

@@ -46,9 +46,7 @@ def read_gear(source: Path | str | Mapping[str, Any]) -> Gear:
     """Read a gear file, or its content as a mapping, and merge its priors.
 
     In a mapping the names of tables may be left out. Later priors win: the shipped
-    ones, the material's, those of certificates, those of the gear file. A shipped
-    influence coefficient K refers to the theory `ring`. Of a spring the material says
-    how the stiffness changes with temperature.
+    ones, the material's, those of certificates, those of the gear file.
 
     Raises:
         InputError: holds everything that is wrong with the file.

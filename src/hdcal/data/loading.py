@@ -36,22 +36,13 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Motion:
-    """Movement of the deformation, row by row, shape (n,).
-
-    Attributes:
-        direction: +1 where the deformation increased, -1 decreased, 0 was held.
-        sense: sign of the last movement, before any that of the first one, +1 in a run
-            that never moves.
-        rate: deformation rate [mm/s], 0 on holds and without time.
-        features: those present among those in `Records.known`.
-        resets: rows reached by one step back over most of the range.
-    """
+    """Movement of the deformation, row by row, shape (n,), as in `Records`."""
 
     direction: np.ndarray
-    sense: np.ndarray
+    sense: np.ndarray  # before any movement that of the first one, +1 without one
     rate: np.ndarray
-    features: frozenset[str]
-    resets: tuple[int, ...] = ()
+    features: frozenset[str]  # those present among those in `Records.known`
+    resets: tuple[int, ...] = ()  # rows reached by one step back over most of the range
 
 
 class _Move(NamedTuple):
@@ -96,11 +87,8 @@ def derive_motion(
 ) -> Motion:
     """Return the motion inside each run.
 
-    Args:
-        deformation: in the order it was taken [mm], shape (n,), as run and time.
-        run: index of the mounting.
-        time: not decreasing within a run [s].
-        hidden: whether scatter hides the movement: then every row counts as loading.
+    Arrays are in the order in which they were taken, shape (n,); time does not decrease
+    within a run. Where scatter hides the movement, every row counts as loading.
     """
     size = len(deformation)
     direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)

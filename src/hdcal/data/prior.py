@@ -31,11 +31,7 @@ class Prior(eqx.Module):
 
 
 def scaled(prior: Prior, factor) -> Prior:
-    """Return the prior of factor × parameter (factor > 0).
-
-    Raises:
-        ValueError: a beta prior has no scale.
-    """
+    """Return the prior of factor × parameter (factor > 0)."""
     if prior.family == "beta":
         raise ValueError("a beta prior cannot be rescaled")
     # A logarithm's spread does not change with the unit.

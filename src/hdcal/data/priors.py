@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ValidationInfo, create_model
 
-from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
+from hdcal.data.findings import did_you_mean
+from hdcal.data.gear_file.toml_file import TomlFile, read_toml
 from hdcal.data.gear_file.validation import STRICT, checked, fault
 from hdcal.data.plausible import RANGES, out_of_range, range_of
 from hdcal.data.prior import FAMILIES, REFERENCE, FullScale, scaled
@@ -119,13 +120,9 @@ _ENTRIES = {family: _entry_of(numbers) for family, numbers in FAMILIES.items()}
 def read_prior(
     entry: object, key: str, toml: TomlFile, unit: str | None = None
 ) -> Prior:
-    """Read one entry such as `{ family = "normal", mean = 0.0, sd = 5.0 }`.
+    """Read the entry at a dotted key, as `{ family = "normal", mean = 0.0, sd = 5.0 }`.
 
-    Args:
-        entry: as parsed.
-        key: dotted key, for findings.
-        toml: the file in which it stands.
-        unit: code unit of the parameter; None accepts any.
+    The code unit None accepts any.
     """
     if not isinstance(entry, dict):
         example = f'{{ family = "normal", mean = 0.0, sd = 1.0, unit = "{unit or 1}" }}'

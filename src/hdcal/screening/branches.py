@@ -167,10 +167,7 @@ def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _line(x: np.ndarray, y: np.ndarray, scatter: float) -> tuple[float, float]:
-    """Return the slope of a line and its standard error.
-
-    Scatter of the deformation, of a known size, is allowed for.
-    """
+    """Return a slope and its standard error, corrected for the scatter of x."""
     x, y = x - x.mean(), y - y.mean()
     square = float(x @ x)
     true = max(square - x.size * scatter**2, 0.1 * square)

@@ -51,23 +51,16 @@ Stretches = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True)
 class Observation:
-    """One finding in the record, and what was done about it.
-
-    Attributes:
-        rows: first and last row of each stretch that it concerns, from 0.
-        size: in `unit`.
-        where: the rows as their file names them.
-        words: a sentence without a full stop.
-    """
+    """One finding in the record, and what was done about it."""
 
     kind: Kind
-    rows: Stretches
+    rows: Stretches  # from 0
     size: float
     unit: str
     action: Action
     run: int = 0
-    where: str = ""
-    words: str = ""
+    where: str = ""  # the rows as their file names them
+    words: str = ""  # a sentence without a full stop
     gear: str = ""
 
     @property
@@ -90,31 +83,19 @@ class StraightPart:
 
 @dataclass(frozen=True)
 class Screening:
-    """A record after screening; arrays have the shape (n,).
-
-    Attributes:
-        segment: index into `SEGMENTS`.
-        deformation: with each jump of its zero taken out [mm].
-        force: likewise, turned where its sign was opposite [N].
-        zero: number of jumps of a zero before each row in its run.
-        deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
-        trembling: whether that scatter hides the direction of the movement.
-        straight: of a single run with rows enough.
-        working_range: in words; empty where none is stated.
-        straight_in_range: longest straight part within a range chosen by its ends.
-    """
+    """A record after screening; arrays have the shape (n,)."""
 
     observations: tuple[Observation, ...]
-    segment: np.ndarray
+    segment: np.ndarray  # index into `SEGMENTS`
     kept: np.ndarray
-    deformation: np.ndarray
-    force: np.ndarray
-    zero: np.ndarray
-    deformation_sd: float = 0.0
-    trembling: bool = False
-    straight: StraightPart | None = None
-    working_range: str = ""
-    straight_in_range: StraightPart | None = None
+    deformation: np.ndarray  # with each jump of its zero taken out [mm]
+    force: np.ndarray  # likewise, turned where its sign was opposite [N]
+    zero: np.ndarray  # number of jumps before each row in its run
+    deformation_sd: float = 0.0  # scatter of the gauge [mm]; 0 where none shows
+    trembling: bool = False  # the scatter hides the direction of the movement
+    straight: StraightPart | None = None  # of a single run with rows enough
+    working_range: str = ""  # in words; empty where none is stated
+    straight_in_range: StraightPart | None = None  # of a range chosen by its ends
 
     @property
     def excluded(self) -> tuple[tuple[float, float], ...]:

@@ -35,10 +35,7 @@ _JUMPS: dict[str, tuple[Kind, str]] = {
 
 @dataclass
 class Run:
-    """One run on its way through the screening; arrays are of its rows, shape (r,).
-
-    Attributes as in `Screening`; x and y are deformation and force.
-    """
+    """One run on its way through the screening, as in `Screening`; shape (r,)."""
 
     index: int
     rows: np.ndarray  # in the whole record
@@ -108,10 +105,7 @@ def look_at(one: Run) -> None:
 
 
 def _repeats(one: Run) -> None:
-    """Leave out rows that repeat a reading, where a logger is faster than its gauges.
-
-    Each reading then stands in as many rows; a hold has as many as it takes.
-    """
+    """Leave out rows that repeat a reading of a logger faster than its gauges."""
     kept, rows = np.flatnonzero(one.kept), one.distinct()
     times = np.diff(np.searchsorted(kept, rows))
     if rows.size < FEWEST or np.median(times) < 2.0:

@@ -27,10 +27,7 @@ def rows_of_runs(run: np.ndarray) -> list[np.ndarray]:
 
 
 def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
-    """Return rows at which x reverses by more than a threshold, and the first sign.
-
-    The sign is 0 where x never moves by the threshold.
-    """
+    """Return rows at which x reverses by a threshold, and the first sign, or 0."""
     # Only rows where the difference changes sign can be reversals, so the loop,
     # which has to be sequential, sees those alone.
     rows = np.flatnonzero(np.diff(x, prepend=np.nan) != 0)

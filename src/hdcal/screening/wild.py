@@ -30,9 +30,8 @@ FEWEST = 12
 def wild_readings(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return rows that are wild, and their distance from the curve.
 
-    Each row is compared with a robust line through its neighbours, so that several
-    wild ones cannot hide each other. It has to be unusual on the curve of force over
-    deformation, and in the sequence of one of the two channels.
+    Each row is compared with a robust line through its neighbours, so that several wild
+    ones cannot hide each other: on the curve, and in the sequence of one channel.
     """
     if x.size < FEWEST:
         return np.array([], int), np.array([])

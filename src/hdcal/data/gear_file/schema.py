@@ -77,13 +77,7 @@ class GearFile(BaseModel):
 
 
 def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the tables of a gear file from a mapping that may leave out their names.
-
-    A key that no table has is put into [gear], where the schema refuses it.
-
-    Raises:
-        InputError: a key is stated twice.
-    """
+    """Return the tables of a gear file from a mapping, with or without their names."""
     plain = {
         str(key): dict(value) if isinstance(value, Mapping) else value
         for key, value in source.items()

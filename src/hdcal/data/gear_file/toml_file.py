@@ -5,7 +5,6 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
@@ -62,14 +61,6 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         row = int(place["row"]) if place else None
         raise refusal(words, "Correct that line", row) from None
     return TomlFile(file, table)
-
-
-def did_you_mean(name: str, known: list[str]) -> str:
-    """Return a remedy with the likeliest meaning of an unknown name, and all known."""
-    by_lower = {item.lower(): item for item in known}
-    near = get_close_matches(name.lower(), by_lower, 1, 0.5)
-    hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
-    return f"{hint}Known are: {', '.join(known)}"
 
 
 def gear_text(tables: Mapping[str, Mapping[str, str | float]]) -> str:

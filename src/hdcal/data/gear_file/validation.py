@@ -6,7 +6,8 @@ from typing import Any, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
-from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean
+from hdcal.data.findings import did_you_mean
+from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.plausible import out_of_range, range_of
 from hdcal.errors import Finding, InputError
 

@@ -42,15 +42,11 @@ def read_gear_folder(
     skip_bad: bool | None = None,
     range: str | None = None,
 ) -> tuple[Case, dict[str, list] | None]:
-    """Read a folder with a file for each gear, or with a folder for each.
+    """Read a folder with a file, or a folder, for each gear; arguments as `read_case`.
 
     Where a file names no gears, all of its rows are of the one that it, or its folder,
-    is called after. A file that cannot be read is a bad gear. Arguments are those of
-    `read_case`; the gear is by default the gear.toml in the folder, or that of the
-    first gear, from which others may differ in their sizes.
-
-    Raises:
-        InputError: holds everything that is wrong with any file.
+    is called after. A file that cannot be read is a bad gear. The gear is by default
+    the gear.toml in the folder, or that of the first gear; others differ in sizes.
 
     Returns:
         The case, and a table of the sizes of each gear where they have gear files.
@@ -166,14 +162,11 @@ def _stated_by_some(stated: Sequence[frozenset[str]]) -> Iterator[str]:
 
 
 def labelled(measured: Measurements, label: str) -> Measurements:
-    """Return measurements with the gear of each row, and the file in its row's name.
-
-    A gear of two files was mounted for each of them.
-    """
+    """Return measurements with the gear of each row, and the file in its row's name."""
     frame = measured.frame.set_axis([f"{row} of {label}" for row in measured.rows])
     if "specimen" not in measured.stated:
         frame = frame.assign(specimen=label)
-    else:
+    else:  # a gear of two files was mounted for each of them
         runs = frame["run"].cat.rename_categories(lambda run: f"{label} {run}".strip())
         frame = frame.assign(run=runs)
     return replace(measured, frame=frame)

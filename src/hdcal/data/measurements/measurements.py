@@ -42,20 +42,16 @@ _LISTED = 20
 class Measurements:
     """Readings in the order in which they were taken, as in `Case`.
 
-    Attributes:
-        frame: columns by quantity, in code units, indexed by the row of the source.
-            There always are deformation, force, and the labels `specimen` and `run`,
-            "1" and "" where nothing is stated; `zero` counts the jumps of a zero
-            before a row.
-        stated: quantities that the source states.
-        named: `Case.columns`.
+    The frame holds columns by quantity, in code units, indexed by the row of the
+    source: always deformation, force, `specimen` and `run`, "1" and "" where nothing is
+    stated, and `zero`, the number of jumps of a zero before a row.
     """
 
     frame: pd.DataFrame
     file: str
     sha256: str = ""
-    stated: frozenset[str] = frozenset()
-    named: dict[str, str] = field(default_factory=dict)
+    stated: frozenset[str] = frozenset()  # quantities that the source states
+    named: dict[str, str] = field(default_factory=dict)  # `Case.columns`
     notes: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
     units: Quantities = FORCE
@@ -102,13 +98,7 @@ def read_measurements(
     gear: Gear | None = None,
     skip_bad: bool | None = None,
 ) -> Measurements:
-    """Read a file or a table in memory; arguments are those of `read_case`.
-
-    The radius of the gear bounds the deformations.
-
-    Raises:
-        InputError: holds everything that is wrong with the source.
-    """
+    """Read a file or a table in memory; arguments are those of `read_case`."""
     name = IN_MEMORY if is_frame(data) else str(data)
     name = name if sheet is None else f"{name}, sheet {quoted(sheet)}"
     with FileFindings(name) as findings:

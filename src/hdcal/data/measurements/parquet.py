@@ -106,11 +106,7 @@ def open_parquet(
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
-    """Yield the rows of one file of a source, in their order, not screened.
-
-    Raises:
-        InputError: holds the faults of the first batch that has some.
-    """
+    """Yield the rows of one file of a source, in their order, not screened."""
     with FileFindings(file) as findings:
         dataset = parquet_table([file], source.root, findings)
     dataset = dataset.replace_schema(source.schema)

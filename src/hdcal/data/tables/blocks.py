@@ -32,29 +32,19 @@ _COMMENT = re.compile(r"[#%]")
 
 @dataclass(frozen=True)
 class ReadTable:
-    """Readings of a source.
+    """Readings of a source."""
 
-    Attributes:
-        headers: with their units, shape (c,).
-        header_row: of the headers in the source, or of the first reading.
-        named: whether there is a row of headers.
-        conflicts: unit that a row of units states against a header, by position.
-        empty: positions of columns without any cell.
-        notes: what was assumed.
-        left_out: what was not read.
-        runs: number of the run of each row by repeated headers, shape (n,).
-    """
-
-    headers: tuple[str, ...]
-    header_row: int
+    headers: tuple[str, ...]  # with their units, shape (c,)
+    header_row: int  # in the source, or that of the first reading
     grid: Grid
-    named: bool = True
+    named: bool = True  # whether there is a row of headers
+    # Unit that a row of units states against a header, by position.
     conflicts: Mapping[int, str] = field(default_factory=dict)
     unit_row: int | None = None
-    empty: frozenset[int] = frozenset()
-    notes: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
-    runs: np.ndarray | None = None
+    empty: frozenset[int] = frozenset()  # positions of columns without any cell
+    notes: tuple[str, ...] = ()  # what was assumed
+    left_out: tuple[str, ...] = ()  # what was not read
+    runs: np.ndarray | None = None  # number of the run by repeated headers, shape (n,)
 
     @property
     def rows(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, did_you_mean
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
     DIMENSIONS,
@@ -117,10 +117,8 @@ def _check_names(
         remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
         findings.refuse(words, remedy, table.header_row)
     for quantity in (name for name in mapping if name not in QUANTITIES):
-        near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
-        hint = f"Did you mean {near[0]}? " if near else ""
         words = f"`columns` {quantity}=… names no quantity that hdcal knows"
-        findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
+        findings.add(words, did_you_mean(quantity, [*QUANTITIES]))
 
 
 class _Chooser:

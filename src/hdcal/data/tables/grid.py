@@ -42,18 +42,14 @@ class SourceLine(NamedTuple):
 class Grid:
     """Rows of cells.
 
-    Attributes:
-        rows: row of the source of each, shape (n,), 1 = first.
-        columns: shape (n,) each: floats, NaN for an empty cell, where the source states
-            that a column holds numbers; else texts on one line and stored numbers.
-        loose: rows of the source with another number of cells.
-        separator: character between the cells of a text.
+    A column, shape (n,), holds floats, NaN for an empty cell, where the source states
+    that it holds numbers; else texts on one line and stored numbers.
     """
 
-    rows: np.ndarray
+    rows: np.ndarray  # of the source, shape (n,), 1 = first
     columns: list[np.ndarray]
-    loose: tuple[SourceLine, ...] = ()
-    separator: str = ""
+    loose: tuple[SourceLine, ...] = ()  # with another number of cells
+    separator: str = ""  # between the cells of a text
 
     @property
     def width(self) -> int:
@@ -115,11 +111,9 @@ def split_line(line: str, separator: str) -> list[str]:
 
 
 def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
-    """Return the grid of a DataFrame below a row of its names.
-
-    Columns that are only counted have no headers: they are asked for by number.
-    """
+    """Return the grid of a DataFrame whose first row has a number."""
     names = [str(name) for name in frame.columns]
+    # Columns that are only counted have no headers: they are asked for by number.
     counted = all(name.isdigit() for name in names)
     header = () if counted else (SourceLine(first - 1, names, fits=True),)
     rows = np.arange(len(frame)) + (first - 1 if counted else first)

@@ -170,10 +170,7 @@ def _is_other(word: str) -> bool:
 
 
 def _quantity(name: str, words: list[str], unit: Unit | None) -> tuple[str, set[str]]:
-    """Return the quantity that a name means, and the words that say so.
-
-    The dimension of a unit decides between several.
-    """
+    """Return the quantity that a name with a unit means, and the words for it."""
     letter = _LETTERS.get(name.strip(), "")
     if letter and unit is not None and unit.dimension == DIMENSIONS[letter]:
         return letter, {*words}

@@ -47,11 +47,7 @@ def read_source(
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> tuple[ReadTable, str]:
-    """Return the table of a file, a DataFrame or arrays by name, and its hash.
-
-    Raises:
-        InputError: it holds no table, or it is not clear which one is meant.
-    """
+    """Return the table of a file, a DataFrame or arrays by name, and its hash."""
     if is_frame(data):
         grid, sha256 = memory_grid(data, findings)
         return table_of(grid, findings), sha256
