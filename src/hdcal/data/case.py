@@ -21,16 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gear:
-    """The gear file after reading; lengths in mm, temperatures in °C, forces in N.
-
-    Priors are in code units (MPa, 1/K, N, mm), keyed by parameter.
+    """The gear file after reading, in mm, °C and N; priors in MPa, 1/K, N and mm.
 
     Attributes:
         name: free text; untrusted, escape it before showing it in HTML.
         geometry: load_height defaults to length (the open rim); NaN of a spring.
-        reference_temperature: where E(T) = E0 [°C].
-        force_resolution: rounding step of the force reading [N], 0 = none given.
-        nominal_deformation: design deformation [mm].
+        reference_temperature: where E(T) = E0.
+        force_resolution: rounding step of the force reading, 0 = none given.
         priors: K is the influence coefficient under `K_theory`; under `spring` it is
             the stiffness [N/mm], and E0 is 1 MPa by definition.
         source: the TOML as read, for provenance.

@@ -38,8 +38,7 @@ from hdcal.errors import Findings
 _IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
 # The material of a spring that names none, and of any other gear that names none.
 NO_MATERIAL, _MATERIAL = "not stated", "steel"
-# Name in findings of a gear that no file describes.
-_IN_MEMORY = "gear"
+_IN_MEMORY = "gear"  # name in findings of a gear that no file describes
 
 
 def read_gear(source: Path | str | Mapping[str, Any]) -> Gear:
@@ -136,12 +135,12 @@ def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
 
 def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
     """Return priors and facts of the material, with the modulus of a spring."""
-    if _in_table(toml, "gear").get("theory") != SPRING:
-        return _named_material(toml, folder)
-    shipped = rig_priors()
-    own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
-    if "material" not in _in_table(toml, "gear"):
-        return own | {"alpha": shipped["spring_alpha"]}
+    table, own = _in_table(toml, "gear"), {}
+    if table.get("theory") == SPRING:
+        shipped = rig_priors()
+        own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
+        if "material" not in table:
+            return own | {"alpha": shipped["spring_alpha"]}
     return _named_material(toml, folder) | own
 
 

@@ -30,8 +30,7 @@ _MOST, _FEWEST, _CURVED = 8, 2, 4
 # Prior probability that a turning row was read before the movement turned, as a rig
 # does that stops at its set points.
 _BEFORE = 0.99
-# Digits of a computed force.
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # digits of a computed force
 
 
 @dataclass(frozen=True)

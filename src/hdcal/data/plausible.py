@@ -16,10 +16,8 @@ class Range(NamedTuple):
     high: float
     unit: str
     why: str
-    # Whether the ends themselves are out.
-    inner: bool = False
-    # Factor to the unit in which people write it, and that unit.
-    written: tuple[float, str] | None = None
+    inner: bool = False  # whether the ends themselves are out
+    written: tuple[float, str] | None = None  # factor to another unit, and that unit
 
     @property
     def whole(self) -> bool:

@@ -44,11 +44,9 @@ def scaled(prior: Prior, factor) -> Prior:
 
 @dataclass(frozen=True)
 class FullScale:
-    """The largest readings of a rig; by default those that priors are written for.
+    """The largest readings of a rig, or their range where that is smaller."""
 
-    The largest size of a reading, or the range of the readings where that is smaller.
-    """
-
+    # By default those that priors are written for.
     force: float = 100.0  # [N]
     deformation: float = 0.5  # radial [mm]
     slope: float = 200.0  # of both ranges [N/mm]
@@ -75,8 +73,7 @@ class FullScale:
 
 
 REFERENCE = FullScale()
-# A zero may lie so many times farther off than what was read goes.
-_FAR = 10.0
+_FAR = 10.0  # a zero may lie so many times farther off than what was read goes
 
 
 def scale_of(force: np.ndarray, deformation: np.ndarray, reading: str) -> FullScale:

@@ -41,9 +41,8 @@ def read_case(
     """Read a case from a file, a folder or a table in memory.
 
     Args:
-        data: a CSV file, workbook (.xlsx) or Parquet file, or a folder holding data.csv
-            and gear.toml; or a DataFrame, or arrays by name, under the headers of such
-            files.
+        data: a CSV file, workbook (.xlsx) or Parquet file, a folder holding data.csv
+            and gear.toml, or a DataFrame, or arrays by header.
         gear: a gear file, or its content as a mapping, as in
             `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
             default the gear.toml next to the data, and without one a spring of which

@@ -57,10 +57,9 @@ class Records(_InDoublePrecision):
         run: index of the mounting.
         force: as read [N].
         force_sd: known measurement sd [N]; 0 when not given.
-        known: names of what was measured or is present in the loading:
-            temperature, time, angle, force_sd, run, specimen (two or more labels),
-            unloading, holds, rates, holds or rates, cycles, runs and specimens (three
-            or more).
+        known: what was measured or is present in the loading: temperature, time, angle,
+            force_sd, run, specimen (two or more labels), runs, specimens (three or
+            more), unloading, holds, rates, holds or rates, cycles.
     """
 
     deformation: Float[Array, " n"]

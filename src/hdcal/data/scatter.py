@@ -1,11 +1,10 @@
-"""Whether readings scatter at all, and the step of their display."""
+"""Whether readings scatter at all."""
 
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
 from hdcal.errors import Finding, InputError
-from hdcal.screening.local_fit import least_step
 
 # Share of the forces that is no more than rounding of what was computed.
 _NOTHING = 1e-8
@@ -30,11 +29,6 @@ def require_scatter(case: Case) -> None:
     remedy = "To readings that were computed, add noise; of a display, state the step "
     remedy += "as force_resolution_N under [measurement] of the gear file"
     raise InputError([Finding(case.name, words, remedy)])
-
-
-def reading_step(case: Case) -> float:
-    """Return the step of the force display, or else `least_step` [N]."""
-    return case.gear.force_resolution or least_step(np.asarray(case.records.force))
 
 
 def left_of_lines(records: Records, values: np.ndarray) -> np.ndarray:

@@ -69,8 +69,7 @@ SIZES: dict[str, dict[str, float]] = {
     },
     "temperature": {"C °C degC celsius": 1.0, "K": 1.0, "F °F degF": 5.0 / 9.0},
 }
-# Reading in a unit at the zero of °C.
-_ZEROS = {"K": 273.15, "F": 32.0}
+_ZEROS = {"K": 273.15, "F": 32.0}  # reading in a unit at the zero of °C
 # Further units of priors: sizes in N, mm, s and K, and their powers.
 _OF_PRIORS = {
     "MPa": (1.0, (1, -2, 0, 0)),
@@ -132,11 +131,6 @@ def find_unit(text: str) -> Unit | None:
     bare = unicodedata.normalize("NFC", text.strip().strip("()[]").strip())
     # Factors of a torque are joined in many ways.
     return UNITS.get(bare) or UNITS.get(re.sub(r"[\s·⋅*.-]", "", bare))
-
-
-def unit_names(dimension: str) -> list[str]:
-    """Return the usual spellings of the units of a dimension."""
-    return [names.split()[0] for names in SIZES[dimension]]
 
 
 def to_code(unit: str) -> tuple[float, str]:

@@ -14,8 +14,7 @@ MOST_ROWS = 2000
 # No rig resolves a smaller share of the tested range, and no departure below it
 # changes a stiffness by more than some parts in ten thousand.
 RESOLVED = 1e-4
-# So many values show the range and the last digit.
-_SOME = 4000
+_SOME = 4000  # so many values show the range and the last digit
 # Share of the range that is no more than rounding of what was computed.
 _ROUNDING = 1e-8
 # Quotient of the 95 % and the 50 % quantile of |t|, by degrees of freedom.

@@ -43,8 +43,7 @@ LEAST_DIFFERENCE = 0.1
 # A testing machine of class 0.5 may err by this share of the force (ISO 7500-1): a
 # curve that bends by less is a straight line, and slopes that differ by less are one.
 MACHINE_CLASS = 0.005
-# Half a 95 % interval of a normal distribution, in sds.
-NORMAL_95 = 1.96
+NORMAL_95 = 1.96  # half a 95 % interval of a normal distribution, in sds
 # First and last row of each stretch of rows.
 Stretches = tuple[tuple[int, int], ...]
 
@@ -99,10 +98,7 @@ class Screening:
 
     @property
     def excluded(self) -> tuple[tuple[float, float], ...]:
-        """Deformations of rows that were left out, beyond those that stayed [mm].
-
-        Where the force has dropped for good all that lies farther is excluded.
-        """
+        """Deformations [mm] beyond those that stayed; all of them after a drop."""
         x, found = self.deformation, []
         low, high = float(x[self.kept].min()), float(x[self.kept].max())
         for segment, without_end in ((DROPPED, True), (OUTSIDE, False)):

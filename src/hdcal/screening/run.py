@@ -19,10 +19,8 @@ from hdcal.screening.result import (
 )
 from hdcal.screening.wild import FEWEST, wild_readings
 
-# More jumps than this are no faults of a zero but what the part does.
-_MOST_JUMPS = 4
-# A larger share of wild readings is noise with heavy tails.
-_MOST_WILD = 0.1
+_MOST_JUMPS = 4  # more jumps than this are no faults of a zero but what the part does
+_MOST_WILD = 0.1  # a larger share of wild readings is noise with heavy tails
 # Share of the readings that stand in the usual number of rows, or in one more or less,
 # where the logger is faster than the gauges.
 _REGULAR = 0.9
@@ -137,8 +135,7 @@ def _saturation(one: Run) -> None:
         found = saturated_rows(held, moving)
         if found.size:
             one.cut(rows[found], SATURATED)
-            size = float(held[found[0]])
-            one.observe(kind, rows[found], size, unit, "cut")
+            one.observe(kind, rows[found], float(held[found[0]]), unit, "cut")
 
 
 def _scatter(one: Run) -> float:
@@ -153,8 +150,8 @@ def _wild(one: Run) -> None:
         return
     wild = one.with_repeats(rows[found])
     one.cut(wild, WILD)
-    size = float(off[np.argmax(np.abs(off))])
-    one.observe("wild reading", wild, size, "N", "cut")
+    largest = float(off[np.argmax(np.abs(off))])
+    one.observe("wild reading", wild, largest, "N", "cut")
 
 
 def _jumps(one: Run) -> bool:

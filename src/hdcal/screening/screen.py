@@ -15,8 +15,7 @@ from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 
 Sign = Literal["same", "opposite", "unclear", "unknown"]
-# A movement over this share of the range is a branch of the curve.
-_BRANCH = 0.2
+_BRANCH = 0.2  # a movement over this share of the range is a branch of the curve
 # Rank correlation from which on force and deformation surely go together, and the
 # standard errors beyond which it is no chance.
 _CLEAR = 0.9
@@ -26,10 +25,8 @@ _MOST_ROWS = 40
 # What the residuals of a line with independent noise rarely exceed: the largest one,
 # in sd, and the correlation of each with the next one, in its standard errors.
 _LARGEST, _CORRELATED = 2.8, 2.0
-# Share of the range of the force that is noise at most.
-_NOISE = 0.05
-# Rows that show the sign of a slope.
-_FEWEST_FOR_SIGN = 5
+_NOISE = 0.05  # share of the range of the force that is noise at most
+_FEWEST_FOR_SIGN = 5  # rows that show the sign of a slope
 
 
 def screen(
@@ -98,7 +95,8 @@ def _signs(runs: list[Run], wanted: WorkingRange | None, *, whole: bool) -> None
         if sign == "same" or (sign == "unknown" and not turned):
             continue
         rows = np.flatnonzero(one.kept)
-        slope = _rough_slope(one.x[rows], one.y[rows])
+        x, y = one.x[rows], one.y[rows]
+        slope = float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])
         if turned:
             one.y = -one.y
             one.observe("opposite sign", rows, slope, "N/mm", "turned")
@@ -142,10 +140,6 @@ def _inside(wanted: WorkingRange | None, x: np.ndarray, y: np.ndarray) -> np.nda
         if inside.sum() >= _FEWEST_FOR_SIGN:
             return inside
     return np.ones(x.size, bool)
-
-
-def _rough_slope(x: np.ndarray, y: np.ndarray) -> float:
-    return float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])
 
 
 def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:

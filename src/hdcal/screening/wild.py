@@ -17,14 +17,11 @@ from hdcal.screening.result import stretches
 
 # A reading is wild from this many times the steps between the rows about it.
 _STEPS = 2.0
-# It is this many sd from the sequence of its channel.
-_LEAVES = 8.0
-# More wild readings in a row are no reading errors.
-_LONGEST = 3
+_LEAVES = 8.0  # it is this many sd from the sequence of its channel
+_LONGEST = 3  # more wild readings in a row are no reading errors
 # Before and after them the curve is the same, but for this share of their distance.
 _GAP = 0.25
-# Fewer rows tell nothing of what is usual.
-FEWEST = 12
+FEWEST = 12  # fewer rows tell nothing of what is usual
 
 
 def wild_readings(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

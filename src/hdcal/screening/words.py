@@ -7,8 +7,7 @@ import numpy as np
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Kind, Observation
 
-# Stretches of rows that one sentence names.
-_LISTED = 4
+_LISTED = 4  # stretches of rows that one sentence names
 _ZERO = "the rows from there on are moved back by it, as a run with another zero"
 _CUT = "{count} left out ({rows}): "
 _SENTENCES: dict[Kind, str] = {

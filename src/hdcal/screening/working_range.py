@@ -34,8 +34,7 @@ class WorkingRange:
     high: float
     # Of the deformation as read, the largest force of a run, or the straight part.
     unit: Literal["mm", "%", "straight"]
-    # Whether rows of other branches lie between the ends, and are cut.
-    one_branch: bool = False
+    one_branch: bool = False  # rows of other branches between the ends are cut
 
     def words(self, units: Quantities) -> str:
         """Return the range in words."""

@@ -1,9 +1,8 @@
 """Calibration certificates of the rig's gauges: what they state, and as priors.
 
-A gain is an error in proportion to the reading, a zero one that all readings share.
-Neither averages out over rows, and no row shows it. The zero of a force gauge is the
-zero of the force. The zero of the deformation is where the rig touches the gear: to
-the error of finding that point a displacement gauge adds its own.
+A gain is an error in proportion to the reading, a zero one that all readings share:
+no row shows them. The zero of the deformation is where the rig touches the gear: to the
+error of finding that point a displacement gauge adds its own.
 """
 
 import math

@@ -12,8 +12,7 @@ from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.screening.turning_points import TURN_MOST, rows_of_runs, turning_points
 
-# Of a pitch by its drawing.
-_PITCH_LOG_SD = 0.02
+_PITCH_LOG_SD = 0.02  # of a pitch by its drawing
 # Noise is what is faster than the loading: readings err alike over a fifth of a half
 # cycle at most, so that each holds five independent stretches. Slower is a bend.
 _FAST = 0.2

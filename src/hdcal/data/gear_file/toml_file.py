@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from hdcal.data.findings import why_not_readable
+from hdcal.data.findings import FileFindings, why_not_readable
 from hdcal.errors import Finding, InputError
 
 _LARGEST = 1 << 20
@@ -34,24 +34,21 @@ class TomlFile:
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
     """Read a TOML file; raise InputError where it is none."""
-
-    def refusal(problem: str, remedy: str, row: int | None = None) -> InputError:
-        return InputError([Finding(file, problem, remedy, row)])
-
+    findings = FileFindings(file)
     if isinstance(source, Path) and (why := why_not_readable(source, _LARGEST)):
-        raise refusal(*why)
+        findings.refuse(*why)
     try:
         raw = source.read_bytes()
     except FileNotFoundError:
-        raise refusal("does not exist", "Check the name") from None
+        findings.refuse("does not exist", "Check the name")
     except (OSError, ValueError) as error:
         words = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise refusal(words, "Check name and permissions") from None
+        findings.refuse(words, "Check name and permissions")
     try:
         table = tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         row = raw.count(b"\n", 0, error.start) + 1
-        raise refusal("is not UTF-8 text", "Save it as UTF-8", row) from None
+        findings.refuse("is not UTF-8 text", "Save it as UTF-8", row)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         # RecursionError: thousands of nested brackets
         nested = isinstance(error, RecursionError)
@@ -59,7 +56,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         place = _PLACE.search(message)
         words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
-        raise refusal(words, "Correct that line", row) from None
+        findings.refuse(words, "Correct that line", row)
     return TomlFile(file, table)
 
 

@@ -17,7 +17,6 @@ from hdcal.data.measurements.notes import (
     mountings_note,
     resets_note,
     rigs_note,
-    temperature_note,
 )
 from hdcal.data.measurements.screened import asked_range, screened, screening_notes
 from hdcal.data.prior import scale_of
@@ -44,8 +43,8 @@ def case_of(
 ) -> Case:
     """Return what was measured on a gear, or several of its kind, as a case."""
     wanted = asked_range(range or gear.source.get("measurement", {}).get("range"))
-    before = gear_notes(gear, measured["force"])
-    notes = [*notes, *before, *temperature_note(measured.get("temperature"))]
+    before = gear_notes(gear, measured["force"], measured.get("temperature"))
+    notes = [*notes, *before]
     measured, screening = screened(measured, wanted, skip_bad)
     return screened_case(measured, screening, gear, notes, name)
 

@@ -9,8 +9,7 @@ import pandas as pd
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
-# What is the same all through a mounting.
-TELLING = ("date", "rig", "operator")
+TELLING = ("date", "rig", "operator")  # what is the same all through a mounting
 # The day of a time stamp in any form; a date in ISO 8601, alone or with a time.
 _DAY = r"^(\d+[-./]\d+[-./]\d+)"
 _ISO = r"^\d{4}-\d\d-\d\d(?:[T ]|$)"
@@ -101,10 +100,7 @@ def _one_each(
 
 
 def _dates(frame: pd.DataFrame, run: np.ndarray) -> tuple[tuple[str, ...], str]:
-    """Return the first date of each run, or none and a note where one is unreadable.
-
-    In ISO 8601; empty for a run that states none.
-    """
+    """Return the first date of each run, or none and a note where one is unreadable."""
     texts: Any = pd.Series(
         frame["date"].astype(str).to_numpy() if "date" in frame else []
     )

@@ -34,8 +34,7 @@ from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
 from hdcal.quantities import FORCE, TORQUE, Quantities
 
-# Labels that one finding names.
-_LISTED = 20
+_LISTED = 20  # labels that one finding names
 
 
 @dataclass(frozen=True)
@@ -183,10 +182,7 @@ def _measured(
 def _with_time(
     read: Measurements, column: Column, findings: FileFindings
 ) -> Measurements:
-    """Return measurements with a time that never goes back within a run, or without.
-
-    One that goes back is refused where it is named, and not used where it was guessed.
-    """
+    """Refuse a time that goes back within a run, or drop it where it was guessed."""
     index, names = read.runs
     back = rows_back_in_time(read["time"], index)
     if not back.any():

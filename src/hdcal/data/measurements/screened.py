@@ -23,8 +23,7 @@ from hdcal.screening.working_range import (
     read_range,
 )
 
-# Findings of a record that are listed.
-_LISTED = 50
+_LISTED = 50  # findings of a record that are listed
 
 
 def asked_range(wanted: str | None) -> WorkingRange | None:

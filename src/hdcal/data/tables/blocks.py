@@ -19,8 +19,7 @@ from hdcal.errors import quoted
 
 # Rows at the top, and spread over the rest, that show which columns hold numbers.
 _SAMPLE = 400
-# Rows from which a table of other columns is too large to be passed over.
-_FEWEST = 5
+_FEWEST = 5  # rows from which a table of other columns is too large to be passed over
 _SUMMARIES = {
     *("mean", "average", "avg", "sum", "total", "sd", "std", "stdev", "std dev"),
     *("median", "cv", "range", "variance", "minimum", "maximum", "min", "max"),

@@ -21,8 +21,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
 # First characters of a text that a spreadsheet would run as a formula. A leading
 # apostrophe makes it show the rest as text.
 _RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t", "\r")
-# Label of a row whose source states none.
-NOT_STATED = "not stated"
+NOT_STATED = "not stated"  # label of a row whose source states none
 # Index, problem and remedy of a cell.
 Fault = tuple[int, str, str]
 

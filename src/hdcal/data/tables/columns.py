@@ -25,10 +25,8 @@ from hdcal.data.units import Unit, find_unit
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
-# Of a torsional spring, in the same order.
-_TURNING = ("angle", "torque")
-# Columns that are listed where the user has to choose.
-_SHOWN = 12
+_TURNING = ("angle", "torque")  # of a torsional spring, in the same order
+_SHOWN = 12  # columns that are listed where the user has to choose
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import unicodedata
 from functools import cache
 from typing import NamedTuple
 
-from hdcal.data.units import Unit, find_unit, unit_names
+from hdcal.data.units import SIZES, Unit, find_unit
 
 # Dimension of each quantity that is a number.
 DIMENSIONS = {
@@ -141,7 +141,7 @@ def is_unit_text(text: str) -> bool:
 
 def unit_advice(text: str, quantity: str) -> str:
     """Return what to write for a text that is no unit of a quantity."""
-    names = unit_names(DIMENSIONS[quantity])
+    names = [spellings.split()[0] for spellings in SIZES[DIMENSIONS[quantity]]]
     bare = re.sub(r"[\s·*.-]", "", text)
     near = [name for name in names if name.lower() == bare.lower()]
     for words, forces in _ADVICE.items():

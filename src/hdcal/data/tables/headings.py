@@ -9,8 +9,7 @@ from hdcal.data.tables.grid import SourceLine
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, is_unit_text, parse_header
 from hdcal.data.units import find_unit
 
-# Lines above the readings among which the names stand.
-_NEAR = 20
+_NEAR = 20  # lines above the readings among which the names stand
 # Words before a row of units, and names of columns of them.
 UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "unité", "単位", "单位"}
 UNIT_LABELS |= {"y_unit_label"}
@@ -26,8 +25,7 @@ class Heading(NamedTuple):
     last: int = 0  # row of the last of names and units
     unit_row: int | None = None
     cells: int = 0  # number of names
-    # Other unit that the row of units states, by position.
-    conflicts: Mapping[int, str] = MappingProxyType({})
+    conflicts: Mapping[int, str] = MappingProxyType({})  # units of the row of units
 
 
 def find_heading(

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from pyarrow import Schema, Table
     from pyarrow.dataset import Dataset
 
-# First bytes of a Parquet file.
-PARQUET = b"PAR1"
+PARQUET = b"PAR1"  # first bytes of a Parquet file
 # Tables of other kinds, of which a folder is a case.
 _OTHERS = {".csv", ".txt", ".tsv", ".xlsx", ".lvm", ".dat"}
 

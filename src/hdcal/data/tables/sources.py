@@ -21,8 +21,7 @@ from hdcal.data.tables.workbook import sheet_grid
 from hdcal.data.units import find_unit
 from hdcal.errors import quoted
 
-# What findings call a table in memory.
-IN_MEMORY = "DataFrame"
+IN_MEMORY = "DataFrame"  # what findings call a table in memory
 _SHOWN = 50  # rows that show whether cells hold units
 _WORKBOOK = b"PK\x03\x04"
 # First bytes of files that are no text.

@@ -17,8 +17,7 @@ _LONGEST_LINE = 1 << 20
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
 _WESTERN = {*"°µ²³·–äöüßÄÖÜéèêëàâçùûîïôÉÈÊÀÇñóíá"}
-# Lines beyond ASCII by which the encoding is judged.
-_JUDGED = 50
+_JUDGED = 50  # lines beyond ASCII by which the encoding is judged
 _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _HTML = re.compile(
     r"\s*<(!doctype html|html|table|head|body|\?xml[^>]*>\s*<html)", re.I
@@ -27,10 +26,8 @@ _HTML = re.compile(
 _SAMPLE = 300
 # Cells by which a line of headers may be longer than the readings below it: remarks.
 _MOST_REMARKS = 2
-# Lines of numbers between blanks that make a table.
-_FEWEST = 5
-# Characters of an empty line.
-_BLANKS = ' \t;,|"'
+_FEWEST = 5  # lines of numbers between blanks that make a table
+_BLANKS = ' \t;,|"'  # characters of an empty line
 _MARK = re.compile(r"\s*[#%*/]+\s*")
 _GAP = re.compile(r"\s{2,}")
 
@@ -146,8 +143,7 @@ def _cells_of(line: str, separator: str) -> list[str]:
 def _dialect(lines: list[str]) -> tuple[str, int]:
     """Return the separator with which most lines hold numbers, and their cells.
 
-    The separator is empty where no line holds two numbers, a blank for any blanks. A
-    tab or a semicolon is never part of a number; a comma may be one.
+    The separator is empty where no line holds two numbers, a blank for any blanks.
     """
     step = max(1, len(lines) // _SAMPLE)
     sample = (*lines[:_SAMPLE], *lines[_SAMPLE::step])

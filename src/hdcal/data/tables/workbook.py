@@ -12,10 +12,8 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.tables.grid import Grid, stored_text
 from hdcal.errors import quoted
 
-# Largest content of an archive, unpacked.
-_LARGEST = 1 << 28
-# Rows with two numbers or more that make a sheet a table of readings.
-_FEWEST = 5
+_LARGEST = 1 << 28  # largest content of an archive, unpacked
+_FEWEST = 5  # rows with two numbers or more that make a sheet a table of readings
 
 
 def sheet_grid(
