@@ -17,7 +17,7 @@ from hdcal.data.gear import read_gear
 from hdcal.data.measurements.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
 from hdcal.data.tables.headers import DIMENSIONS
-from hdcal.data.units import unit_names
+from hdcal.data.units import SIZES
 from hdcal.errors import InputError
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
@@ -41,7 +41,7 @@ def quantity_of(key: str) -> str:
 
 
 def header(quantity: str) -> str:
-    return f"{quantity}_{unit_names(DIMENSIONS[quantity])[0]}"
+    return f"{quantity}_{next(iter(SIZES[DIMENSIONS[quantity]])).split()[0]}"
 
 
 def column(quantity: str, value, folder: Path) -> None:

@@ -97,7 +97,6 @@ def test_bad_input_gives_every_finding_and_writes_nothing(here: Hdcal, case: Pat
         ["calibrat"],
         ["calibrate", XB1, "--chains", "many"],
         ["calibrate", XB1, "--draws", "0"],
-        ["calibrate", XB1, "--theory", "rings"],
         ["calibrate", XB1, "--column", "force=a[N]", "--column", "force=b[N]"],
         ["calibrate", XB1, "--effect", "coulomb_friction"],
         ["diagnose", XB1, "--jobs", "0"],

@@ -134,19 +134,13 @@ def test_a_clock_that_is_reset_is_not_used(tmp_path):
     assert "row 11" in found and "'B'" in found
 
 
-def test_torques_and_angles_are_converted(tmp_path):
-    text = "Torque (mNm),Twist (arcmin)\n" + rows(F, X)
-    case = read(tmp_path, text)
-    np.testing.assert_allclose(case.records.force, 1e-3 * F, rtol=1e-8)
-    np.testing.assert_allclose(case.records.deformation, np.pi / 10800 * X, rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("raw", "word"),
     [
         (b"<html><body><table><tr><td>1</td></tr></table></body></html>", "HTML"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), ".xls"),
         (b"MATLAB 5.0 MAT-file" + bytes(600), "MATLAB"),
+        (b"\x89HDF\r\n" + bytes(600), "HDF5"),
     ],
 )
 def test_a_file_that_is_no_table_is_called_what_it_is(tmp_path, raw, word):

@@ -6,8 +6,8 @@ import io
 import numpy as np
 import pytest
 
-from hdcal.data.formula_cells import with_formula, without_formula
 from hdcal.data.measurements.measurements import read_measurements
+from hdcal.data.tables.cells import with_formula, without_formula
 from hdcal.report.table_files import columns_csv
 
 FORMULAS = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", "＝1+1", "＠SUM(1)"]

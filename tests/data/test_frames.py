@@ -72,10 +72,9 @@ def test_columns_that_are_only_counted_have_no_headers():
         hdcal.read_case(counted)
 
 
-@pytest.mark.parametrize("begins", [b"PAR1", b"\x89HDF\r\n"])
-def test_a_broken_file_is_refused(tmp_path, begins):
-    (tmp_path / "a").write_bytes(begins + bytes(range(256)) * 4)
-    with pytest.raises(InputError, match=r"is (no|an) \S+ file"):
+def test_a_broken_file_is_refused(tmp_path):
+    (tmp_path / "a").write_bytes(b"PAR1" + bytes(range(256)) * 4)
+    with pytest.raises(InputError, match="is no Parquet file"):
         hdcal.read_case(tmp_path / "a")
 
 

@@ -82,9 +82,6 @@ def test_only_the_day_of_a_time_stamp_counts():
 def test_dates_that_cannot_be_read_separate_no_mountings():
     rows = table(MOUNTED[:2]).assign(rig="south")
     assert len(read_case(rows.assign(date=[*"abcdefghij"])).run_labels) == 1
-    # In any form, of which the day counts.
-    days = np.repeat(["01/02/2026 10:00", "03/02/2026 10:00"], 5)
-    assert read_case(rows.assign(date=days)).run_labels == ("01/02/2026", "03/02/2026")
     # One that is misspelt is that of the rows above.
     days = [*rows["date"][:9], "2026-1o-12"]
     assert read_case(rows.assign(date=days)).records.run.tolist() == [0] * 5 + [1] * 5

@@ -23,11 +23,7 @@ STYLES = {
 
 
 class Export:
-    """A file as some program may write it.
-
-    Args:
-        seed: of everything that is random in it.
-    """
+    """A file as some program may write it."""
 
     def __init__(self, seed: int):
         draw, noise = random.Random(seed), np.random.default_rng(seed)

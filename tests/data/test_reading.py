@@ -78,7 +78,6 @@ def test_plain_numbers_are_read_as_cells_are_one_by_one(cell):
 @pytest.mark.parametrize(
     ("header", "name", "value"),
     [
-        ("temperature_K", "temperature", -243.15),
         ("temperature_F", "temperature", -10 / 9),
         ("time_min", "time", 1800.0),
         ("angle_deg", "angle", np.pi / 6),

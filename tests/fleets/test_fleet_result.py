@@ -148,7 +148,7 @@ def test_a_torsional_spring_is_named_after_torques():
     gear = np.repeat(list("ABCD"), 5)
     torque = 9000.0 * x + 0.05 * np.tile([1.0, -1.0, 0.0, -1.0, 1.0], 4)
     table = {"angle_rad": x, "torque_Nm": torque, "gear": gear}
-    readings = fleet_readings(hdcal.read_case(table, theory="spring"))
+    readings = fleet_readings(hdcal.read_case(table))
     fleet = of(readings, {"D": ["zero"]}, deformation=0.008, limit_force=80.0)
     answer = json.loads(fleet.to_json())
     jsonschema_of = Fleet.json_schema(TORQUE)

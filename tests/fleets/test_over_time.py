@@ -31,7 +31,7 @@ def measured(
             table |= {name: make(gear, run) for name, make in columns.items()}
             table |= {"deformation_mm": side * X, "force_N": force}
             parts.append(pd.DataFrame(table))
-    return fleet_readings(hdcal.read_case(pd.concat(parts), theory="spring"))
+    return fleet_readings(hdcal.read_case(pd.concat(parts)))
 
 
 def changes(readings: FleetReadings) -> dict[str, Change]:
@@ -126,6 +126,5 @@ def test_one_date_or_none_is_no_time():
             "deformation_mm": [0, 1, 2] * 3,
             "force_N": [0, 1, 2.1] * 3,
         },
-        theory="spring",
     )
     assert over_time(fleet_readings(without), fitted(fleet_readings(without))) == ()

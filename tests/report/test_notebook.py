@@ -24,7 +24,7 @@ def results():
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "tested"),
         "Fleet": (handmade(), "% softer (95 %: "),
         "Margin": (hdcal.margin(posterior, 0.4), "99 %"),
-        "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
+        "Case": (hdcal.read_case(GEAR.parent), "in order"),
         "Posterior": (posterior, "per millimetre as read"),
         "Response": (
             hdcal.respond(still_posterior(), "step", points=21, draws=20),

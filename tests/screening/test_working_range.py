@@ -48,6 +48,18 @@ def test_the_gear_file_may_state_it_and_the_caller_overrides_it():
         hdcal.read_case(TABLE, range="0.10:0.115")
 
 
+def test_a_force_that_falls_in_places_is_asked_about_and_answered_by_a_range():
+    """It falls at first, and rises by 20 N/mm from 2 to 4 mm."""
+    x = np.linspace(0.0, 10.0, 200)
+    force = 20.0 * x + np.random.default_rng(1).normal(0.0, 0.2, 200)
+    data = {"deformation_mm": x, "force_N": force + 28.0 * (np.abs(x % 4.0 - 2.0) - x)}
+    with pytest.raises(InputError, match="by `range`"):
+        hdcal.read_case(data)
+    records = hdcal.read_case(data, range="2.05:3.95").records
+    slope = np.polyfit(records.deformation, records.force, 1)[0]
+    assert slope == pytest.approx(20.0, rel=4e-3)
+
+
 def test_a_command_takes_it(tmp_path, here):
     TABLE.to_csv(tmp_path / "data.csv", index=False)
     done = here("check", str(tmp_path / "data.csv"), "--range", "0.105:0.405", "--json")

@@ -74,4 +74,4 @@ def ordinary(gears: int, rng: np.random.Generator) -> GearRows:
 
 
 _ROWS = {"deformation_mm": X, "force_N": 200.0 * X + 0.3 * np.sin(37.0 * X)}
-_CASE = hdcal.read_case(_ROWS, theory="spring")
+_CASE = hdcal.read_case(_ROWS)

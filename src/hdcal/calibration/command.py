@@ -65,7 +65,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
         wrong.attempt(check_settings, **{name: settings[name] for name in size})
         wrong.attempt(choose_effects, effects)
         reading = take_reading(settings)
-        settings["theory"] = reading["theory"]
         case = read_given(console, data, **reading)
         plain = not (dynamic or effects) and settings.get("with_gap") is None
         if plain and case is not None:

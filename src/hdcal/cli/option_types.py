@@ -200,7 +200,7 @@ def read_named(
 
 
 def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
-    from hdcal.data.gear_file.toml_file import did_you_mean
+    from hdcal.data.findings import did_you_mean
 
     return Finding(option, f"unknown key '{name}'", did_you_mean(name, list(known)))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -14,7 +14,6 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
-from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
@@ -82,11 +81,6 @@ reading_options = combined(
         "until the force drops for good [default: all; calibrate takes straight where "
         "the curve is not a line].",
     ),
-    click.option(
-        "--theory",
-        type=click.Choice(get_args(Theory)),
-        help="Use this stiffness formula; overrides the gear file.",
-    ),
 )
 # Which case is read, and how.
 case_options = combined(reading_options, click.argument("data", metavar="DATA"))
@@ -94,7 +88,7 @@ case_options = combined(reading_options, click.argument("data", metavar="DATA"))
 
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
-    names = "gear", "columns", "theory", "encoding", "sheet", "specimen", "range"
+    names = "gear", "columns", "encoding", "sheet", "specimen", "range"
     return {name: settings.pop(name) for name in names}
 
 

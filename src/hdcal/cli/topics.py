@@ -17,7 +17,7 @@ def show_topic(console: Console, topic):
 
     The effects of the library are topics too: `hdcal help hysteresis`.
     """
-    from hdcal.data.gear_file.toml_file import did_you_mean
+    from hdcal.data.findings import did_you_mean
     from hdcal.data.resources import pages
 
     found = pages()

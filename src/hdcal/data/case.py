@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.prior import Prior
+from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
@@ -22,32 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gear:
-    """The gear file after reading; lengths in mm, temperatures in °C, forces in N.
-
-    Priors are in code units (MPa, 1/K, N, mm), keyed by parameter.
+    """The gear file after reading, in mm, °C and N; priors in MPa, 1/K, N and mm.
 
     Attributes:
         name: free text; untrusted, escape it before showing it in HTML.
-        geometry: sizes, with load_height defaulting to length (the open rim); NaN where
-            a spring states none.
-        material: name of the material's prior file.
-        theory: which stiffness formula K multiplies.
-        reading: whether the deformation column is radial or diametral.
-        reference_temperature: where E(T) = E0 [°C].
-        force_resolution: rounding step of the force reading [N], 0 = none given.
-        nominal_deformation: design deformation [mm] or None.
-        priors: K, E0, alpha, force_offset, deformation_offset and sigma, with material
-            and overrides. K is the influence coefficient under `K_theory`; under
-            `spring` it is the stiffness [N/mm], and E0 is 1 MPa by definition.
-        K_theory: the theory that the prior of K refers to.
+        geometry: load_height defaults to length (the open rim); NaN of a spring.
+        reference_temperature: where E(T) = E0.
+        force_resolution: rounding step of the force reading, 0 = none given.
+        priors: K is the influence coefficient under `K_theory`; under `spring` it is
+            the stiffness [N/mm], and E0 is 1 MPa by definition.
         source: the TOML as read, for provenance.
-        scale_priors: run_offset_sd, specimen_sd, gap_sd, gap_length and
-            noise_correlation.
-        effect_priors: those that the gear file states, by `effect.parameter`; the names
-            are not checked here.
-        dynamic_priors: priors of a moving gear; `mass` only where it is stated, else
-            `mass_ratio`.
-        density: density of the material [N·s²/mm⁴], None where its file states none.
+        effect_priors: by `effect.parameter`; the names are not checked here.
+        dynamic_priors: `mass` only where it is stated, else `mass_ratio`.
+        density: of the material [N·s²/mm⁴].
         gauge_priors: those of certificates, by keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
     """
@@ -72,10 +58,7 @@ class Gear:
 
     @property
     def reach(self) -> float:
-        """Deformation as read that no gear of this radius reaches [mm].
-
-        Infinite where no radius is known.
-        """
+        """Deformation as read that no gear of this radius reaches [mm], or inf."""
         radius = float(self.geometry.radius)
         as_read = radius * (2.0 if self.reading == "diametral" else 1.0)
         return math.inf if math.isnan(as_read) else as_read
@@ -86,26 +69,18 @@ class Case:
     """Records of one data file on one gear, with their source.
 
     Attributes:
-        name: stem of the file, or name of the folder.
-        gear: the gear and its priors.
-        records: the rows.
-        run_labels: label of each run index.
-        specimen_labels: label of each specimen index.
-        data_sha256: hash of the data file's bytes.
-        notes: remarks for the log, such as ignored columns.
+        run_labels: of each run index, as are operators, rigs and dates (ISO 8601);
+            these and lots are empty where nothing is stated.
+        specimen_labels: of each specimen index, as are lots.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
-        lots: lot of each specimen index; empty where none is stated, as the next three.
-        operators: operator of each run index.
-        rigs: rig of each run index.
-        dates: first date of each run index in ISO 8601, empty for a run without one.
         left_out: specimens left out because of a faulty row, each with the finding.
         excluded: ends of each stretch of deformations as read whose rows were left out,
             because the part gave way or for a working range [mm].
         excluded_sense: sign of the movement whose readings were left out, where one
             branch alone was chosen; 0 where none was.
-        screening: of the whole record; None where the rows are not those of a file.
-        units: names and units of force and deformation; of a torsional spring they
-            are a torque [N·m] and an angle [rad].
+        screening: None where the rows are not those of a file.
+        units: of a torsional spring force and deformation are a torque [N·m] and an
+            angle [rad].
     """
 
     name: str

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from hdcal.data.case import Gear
-from hdcal.data.full_scale import FullScale
 from hdcal.data.gear_file.certificates import (
     GAUGE_UNITS,
     certificate_priors,
@@ -16,9 +15,9 @@ from hdcal.data.gear_file.certificates import (
 )
 from hdcal.data.gear_file.rig_facts import rig_fact_priors
 from hdcal.data.gear_file.schema import GearFile, size_findings, tables_of
-from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
+from hdcal.data.gear_file.toml_file import TomlFile, read_toml
 from hdcal.data.gear_file.validation import checked
-from hdcal.data.prior import Prior
+from hdcal.data.prior import FullScale, Prior
 from hdcal.data.priors import (
     DYNAMIC_UNITS,
     MODEL_UNITS,
@@ -32,34 +31,21 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.data.records import Geometry
-from hdcal.data.theory_names import SPRING, Theory
-from hdcal.errors import Finding, Findings
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import Findings
 
 # Shipped priors of the base model that are written for a full scale.
 _IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
 # The material of a spring that names none, and of any other gear that names none.
 NO_MATERIAL, _MATERIAL = "not stated", "steel"
-# Name in findings of a gear that no file describes.
-_IN_MEMORY = "gear"
+_IN_MEMORY = "gear"  # name in findings of a gear that no file describes
 
 
-def read_gear(
-    source: Path | str | Mapping[str, Any], theory: str | None = None
-) -> Gear:
+def read_gear(source: Path | str | Mapping[str, Any]) -> Gear:
     """Read a gear file, or its content as a mapping, and merge its priors.
 
-    Later ones win: shipped rig priors, the material's, those of certificates, those
-    of the gear file. The certificate of a displacement gauge replaces no prior: it
-    adds to the error of the contact point.
-    An influence coefficient K in the file refers to the theory in the file, the
-    shipped one to `ring`. Under `spring` there is a shipped stiffness instead, sizes
-    that are not in the file are NaN, and a material says how the stiffness changes
-    with temperature.
-
-    Args:
-        source: the TOML file; or its tables as a mapping, where the names of the tables
-            may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
-        theory: overrides the theory that K multiplies, not what K's prior means.
+    In a mapping the names of tables may be left out. Later priors win: the shipped
+    ones, the material's, those of certificates, those of the gear file.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -70,20 +56,15 @@ def read_gear(
         path, toml = Path(source), read_toml(Path(source), str(source))
     with Findings() as wrong:
         model = wrong.attempt(checked, GearFile, toml.table, toml)
-        wrong += size_findings(toml, theory)
-        if theory is not None and theory not in get_args(Theory):
-            remedy = did_you_mean(theory, list(get_args(Theory)))
-            wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
-        chosen: Any = theory or _in_table(toml, "gear").get("theory")
-        facts = wrong.attempt(_material, toml, path.parent, chosen)
-        given = wrong.attempt(_given_priors, toml, theory)
+        wrong += size_findings(toml)
+        facts = wrong.attempt(_material, toml, path.parent)
+        given = wrong.attempt(_given_priors, toml)
     assert isinstance(model, GearFile) and facts is not None and given is not None
-    return _assemble(model, chosen or "ring", facts, given, path, toml)
+    return _assemble(model, facts, given, path, toml)
 
 
 def _assemble(
     model: GearFile,
-    chosen: Theory,
     facts: dict[str, Prior],
     given: dict[str, Prior],
     path: Path,
@@ -98,7 +79,7 @@ def _assemble(
     radial = 0.5 if measurement.deformation == "diametral" else 1.0
     effects = {name: prior for name, prior in given.items() if "." in name}
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
-    of_file = sizes.theory if "K" in given else "ring"
+    spring = sizes.theory == SPRING
     fact = {name: float(facts[name].numbers[0]) for name in facts}
     lengths = (
         sizes.wall_thickness_mm,
@@ -110,14 +91,14 @@ def _assemble(
     return Gear(
         name=sizes.name or path.stem,
         geometry=Geometry(*(math.nan if one is None else one for one in lengths)),
-        material=sizes.material or (NO_MATERIAL if chosen == SPRING else _MATERIAL),
-        theory=chosen,
+        material=sizes.material or (NO_MATERIAL if spring else _MATERIAL),
+        theory=sizes.theory,
         reading=measurement.deformation,
         reference_temperature=measurement.reference_temperature_C,
         force_resolution=measurement.force_resolution_N or 0.0,
         nominal_deformation=sizes.nominal_deformation_mm,
         priors={name: merged[name] for name in MODEL_UNITS},
-        K_theory=SPRING if chosen == SPRING else of_file,
+        K_theory=sizes.theory if spring or "K" in given else "ring",
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=rig_fact_priors(model.rig, radial) | effects,
@@ -130,9 +111,8 @@ def _assemble(
 def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
     """Return a gear with shipped priors at the scale of its rig.
 
-    What the gear file states stays. A force zero that nobody states may be anywhere:
-    in the sum of both zeros, which is all that readings show, the deformation's keeps
-    its size.
+    A force zero that nobody states may be anywhere: in the sum of both zeros, which is
+    all that readings show, the deformation's keeps its size.
     """
     shipped = rig_priors()
     shipped["K"] = shipped["spring_stiffness"]
@@ -149,19 +129,18 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
 
 
 def _in_table(toml: TomlFile, name: str) -> Mapping[str, Any]:
-    """Return a table of the gear file; an empty one where it is none."""
     table = toml.table.get(name)
     return table if isinstance(table, dict) else {}
 
 
-def _material(toml: TomlFile, folder: Path, theory: str | None) -> dict[str, Prior]:
+def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
     """Return priors and facts of the material, with the modulus of a spring."""
-    if theory != SPRING:
-        return _named_material(toml, folder)
-    shipped = rig_priors()
-    own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
-    if "material" not in _in_table(toml, "gear"):
-        return own | {"alpha": shipped["spring_alpha"]}
+    table, own = _in_table(toml, "gear"), {}
+    if table.get("theory") == SPRING:
+        shipped = rig_priors()
+        own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
+        if "material" not in table:
+            return own | {"alpha": shipped["spring_alpha"]}
     return _named_material(toml, folder) | own
 
 
@@ -183,14 +162,10 @@ def _named_material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
     raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
 
 
-def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:
-    """Return the priors of the table [priors]; the theory overrides that of the file.
-
-    Those of effects are named `effect.parameter`.
-    """
+def _given_priors(toml: TomlFile) -> dict[str, Prior]:
+    """Return the priors of the table [priors]; of effects by `effect.parameter`."""
     table = _in_table(toml, "priors")
-    stated = _in_table(toml, "gear").get("theory") or "ring"
-    spring = (theory or stated) == SPRING
+    spring = _in_table(toml, "gear").get("theory") == SPRING
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
     units |= {"K": SPRING_UNITS["spring_stiffness"]} if spring else {}
     with Findings() as wrong:
@@ -199,10 +174,6 @@ def _given_priors(toml: TomlFile, theory: str | None) -> dict[str, Prior]:
             remedy = "Leave it out: K is in N/mm"
             wrong.append(toml.finding(words, remedy, "priors.E0"))
             table = {name: table[name] for name in table if name != "E0"}
-        if "K" in table and theory and spring != (stated == SPRING):
-            words = f"is given under the theory '{stated}', which says nothing of "
-            remedy = f"Keep the theory '{stated}'"
-            wrong.append(toml.finding(f"{words}'{theory}'", remedy, "priors.K"))
         priors = wrong.attempt(read_entries, table, units, toml, "priors", effects=True)
     assert priors is not None
     return priors

@@ -1,6 +1,7 @@
 """Direction, sense and rate of the loading, and what the loading can show."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from hdcal.screening.turning_points import (
     envelope,
     noise_sd,
     resting,
+    rows_of_runs,
     turning_points,
 )
 
@@ -22,32 +24,28 @@ _LARGE_MOVE, _CLEAR_RATIO, _LEAST_REST = 0.1, 1.5, 0.02
 # One step back over this share of the range, twice as large as any before it, is where
 # the next ramp begins: nothing was read on the way, so no unloading was measured.
 _RESET_STEP = 0.5
+# Rows of each branch that are compared with the row between them; four and more
+# also show a curvature and a slope of each branch.
+_MOST, _FEWEST, _CURVED = 8, 2, 4
+# Prior probability that a turning row was read before the movement turned, as a rig
+# does that stops at its set points.
+_BEFORE = 0.99
+_ROUNDING = 1e-9  # digits of a computed force
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Movement of the deformation, row by row, shape (n,).
-
-    Attributes:
-        direction: +1 where the deformation increased, -1 decreased, 0 was held.
-        sense: sign of the last movement, before any that of the first one, +1 in a run
-            that never moves.
-        rate: deformation rate [mm/s], 0 on holds and without time.
-        features: those present among `unloading`, `holds`, `rates`, `cycles`, and
-            `holds or rates` where one of the two is.
-        resets: rows reached by one step back over most of the range.
-    """
+    """Movement of the deformation, row by row, shape (n,), as in `Records`."""
 
     direction: np.ndarray
-    sense: np.ndarray
+    sense: np.ndarray  # before any movement that of the first one, +1 without one
     rate: np.ndarray
-    features: frozenset[str]
-    resets: tuple[int, ...] = ()
+    features: frozenset[str]  # those present among those in `Records.known`
+    resets: tuple[int, ...] = ()  # rows reached by one step back over most of the range
 
 
-@dataclass(frozen=True)
-class _Move:
-    """One movement between two reversals; row of the reset, if it is one."""
+class _Move(NamedTuple):
+    """A movement between two reversals; row of the reset, if it is one."""
 
     sign: int
     travel: float
@@ -86,22 +84,17 @@ def derive_motion(
     *,
     hidden: bool = False,
 ) -> Motion:
-    """Derive the motion inside each run.
+    """Return the motion inside each run.
 
-    Args:
-        deformation: in the order it was taken [mm], shape (n,).
-        run: index of the mounting, shape (n,).
-        time: not decreasing within a run [s], shape (n,); None when not measured.
-        hidden: whether scatter hides the movement: then every row counts as loading.
+    Arrays are in the order in which they were taken, shape (n,); time does not decrease
+    within a run. Where scatter hides the movement, every row counts as loading.
     """
     size = len(deformation)
     direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)
     if hidden:
         return Motion(sense, sense, rate, frozenset())
-    order = np.argsort(run, kind="stable")
-    cuts = np.flatnonzero(np.diff(run[order])) + 1
     moves: list[list[_Move]] = []
-    for rows in np.split(order, cuts):
+    for rows in rows_of_runs(run):
         clock = None if time is None else time[rows]
         moves.append(_one_run(deformation[rows], clock, rows, direction, rate))
         if moves[-1]:
@@ -144,13 +137,13 @@ def _one_run(
         moving = ~held
         # the first row of a hold was moved to, also from the hold before it
         moving[1:] |= ~held[:-1] | (np.diff(rising) > tolerance)
-        own = slice(1 if start else 0, None)
-        direction[rows[part][own]] = np.where(moving, sign, 0)[own]
+        new = slice(1 if start else 0, None)
+        direction[rows[part][new]] = np.where(moving, sign, 0)[new]
         speed = 0.0
         if time is not None:
             window = max(0.01 * span, 4 * tolerance)
             speeds = _speeds(rising, time[part], moving, window)
-            rate[rows[part][own]] = np.where(moving, sign * speeds, 0.0)[own]
+            rate[rows[part][new]] = np.where(moving, sign * speeds, 0.0)[new]
             speeds = speeds[moving & (speeds > 0)]
             speed = float(np.median(speeds)) if speeds.size else 0.0
         reset = _reset(x, start, stop, span)
@@ -222,3 +215,68 @@ def _features(moves: list[list[_Move]], rate: np.ndarray, span: float) -> set[st
         slow, fast = np.quantile(moving, [0.1, 0.9])
         features |= {"rates"} if fast >= _CLEAR_RATIO * slow else set()
     return features
+
+
+def sense_at_turns(
+    sense: np.ndarray, deformation: np.ndarray, force: np.ndarray, run: np.ndarray
+) -> np.ndarray:
+    """Return the sense of the movement, with turning rows on the branch of their force.
+
+    The deformation of a turning row does not show whether the movement had turned when
+    the force was read; with friction the two forces differ by the width of the loop.
+    The row gets the sense of the branch that predicts its force better: both branches
+    are extrapolated from their nearest rows, the turning row left out. Arrays are
+    shape (n,); `sense` counts a turning row before its turn.
+    """
+    order = np.argsort(run, kind="stable")
+    x, y, sign = deformation[order], force[order], sense[order].copy()
+    edges = np.flatnonzero((np.diff(sign) != 0) | (np.diff(run[order]) != 0)) + 1
+    edges = np.array([0, *edges, sign.size])
+    # The last row of a branch is the turning row, and belongs to none here.
+    before, after = np.diff(edges)[:-1] - 1, np.diff(edges)[1:]
+    after[:-1] -= 1
+    rows = edges[1:-1] - 1
+    turned = (run[order][rows] == run[order][rows + 1]) if rows.size else rows > 0
+    count = np.where(turned, np.minimum(np.minimum(before, after), _MOST), 0)
+    sizes = [size for size in range(_FEWEST, _MOST + 1) if np.any(count == size)]
+    if not sizes:
+        return sense
+    fits = [_two_branches(x, y, rows[count == size], size) for size in sizes]
+    freedom = sum(free for *_, free in fits)
+    noise = np.sqrt(sum(squares for _, squares, _ in fits) / freedom)
+    noise += _ROUNDING * np.max(np.abs(y))
+    for size, (error, *_) in zip(sizes, fits, strict=True):
+        score = np.log1p((error / noise) ** 2 / freedom)
+        likelier = 0.5 * (freedom + 1) * (score[0] - score[1])
+        late = rows[count == size][likelier > np.log(_BEFORE / (1.0 - _BEFORE))]
+        sign[late] = sign[late + 1]
+    senses = np.empty_like(sense)
+    senses[order] = sign
+    return senses
+
+
+def _two_branches(
+    x: np.ndarray, y: np.ndarray, at: np.ndarray, size: int
+) -> tuple[np.ndarray, float, int]:
+    """Return how two branches predict the force at the turning rows between them.
+
+    Errors of the prediction from before and from after the turn, over their standard
+    errors for a noise of one, shape (2, t); squares left, and degrees of freedom.
+    """
+    steps = np.concatenate([np.arange(-size, 0), np.arange(1, size + 1)])
+    near = at[:, None] + steps
+    u = x[near] - x[at][:, None]
+    u /= np.maximum(np.max(np.abs(u), axis=1, keepdims=True), np.finfo(float).tiny)
+    side = np.broadcast_to(np.sign(steps), u.shape)
+    curved = [side * u, u**2] if size >= _CURVED else []
+    design = np.stack([np.ones_like(u), side, u, *curved], axis=2)
+    inverse = np.linalg.pinv(design)
+    fitted = np.einsum("tpn,tn->tp", inverse, y[near])
+    left = y[near] - np.einsum("tnp,tp->tn", design, fitted)
+    ends = [inverse[:, 0] + way * inverse[:, 1] for way in (-1.0, 1.0)]
+    errors = [
+        (y[at] - np.sum(end * y[near], axis=1)) / np.sqrt(1.0 + np.sum(end**2, axis=1))
+        for end in ends
+    ]
+    free = at.size * (2 * size - design.shape[2])
+    return np.array(errors), float(np.sum(left**2)), free

@@ -10,24 +10,14 @@ from hdcal.errors import Finding, quoted
 
 
 class Range(NamedTuple):
-    """What a quantity can be.
-
-    Attributes:
-        low: smallest value.
-        high: largest value.
-        unit: unit of both; empty for counts and shares.
-        why: what the ends stand for.
-        inner: whether the ends themselves are out.
-        written: factor to the unit in which people write it, and that unit, where it
-            is another one.
-    """
+    """What a quantity can be."""
 
     low: float
     high: float
     unit: str
     why: str
-    inner: bool = False
-    written: tuple[float, str] | None = None
+    inner: bool = False  # whether the ends themselves are out
+    written: tuple[float, str] | None = None  # factor to another unit, and that unit
 
     @property
     def whole(self) -> bool:

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ValidationInfo, create_model
 
-from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
+from hdcal.data.findings import did_you_mean
+from hdcal.data.gear_file.toml_file import TomlFile, read_toml
 from hdcal.data.gear_file.validation import STRICT, checked, fault
 from hdcal.data.plausible import RANGES, out_of_range, range_of
-from hdcal.data.prior import FAMILIES, scaled
+from hdcal.data.prior import FAMILIES, REFERENCE, FullScale, scaled
 from hdcal.data.prior import Prior as Prior
 from hdcal.data.resources import priors_folder
 from hdcal.data.units import UnitError, to_code
@@ -110,7 +110,6 @@ _NUMBERS: dict[str, Any] = {
 
 
 def _entry_of(numbers: tuple[str, ...]) -> type[_Entry]:
-    """Return the model of the entries of a family with these numbers."""
     fields: dict[str, Any] = {n: (_NUMBERS.get(n, float), ...) for n in numbers}
     return create_model("Entry", __base__=_Entry, **fields)
 
@@ -121,19 +120,9 @@ _ENTRIES = {family: _entry_of(numbers) for family, numbers in FAMILIES.items()}
 def read_prior(
     entry: object, key: str, toml: TomlFile, unit: str | None = None
 ) -> Prior:
-    """Read one entry such as `{ family = "normal", mean = 0.0, sd = 5.0 }`.
+    """Read the entry at a dotted key, as `{ family = "normal", mean = 0.0, sd = 5.0 }`.
 
-    Args:
-        entry: as parsed.
-        key: dotted key, for findings.
-        toml: the file in which it stands.
-        unit: code unit of the parameter; None accepts any.
-
-    Returns:
-        The prior in code units.
-
-    Raises:
-        InputError: holds everything that is wrong with the entry.
+    The code unit None accepts any.
     """
     if not isinstance(entry, dict):
         example = f'{{ family = "normal", mean = 0.0, sd = 1.0, unit = "{unit or 1}" }}'
@@ -189,18 +178,10 @@ def read_entries(
     *,
     effects: bool = False,
 ) -> dict[str, Prior]:
-    """Return the priors in a table.
+    """Return the priors in a table at the dotted key `prefix`, or raise InputError.
 
-    Args:
-        table: as parsed.
-        units: code unit of every parameter that it may hold.
-        toml: the file in which it stands.
-        prefix: dotted key of the table, empty at the top.
-        effects: whether it may hold parameters of effects, unchecked, too: a table for
-            each effect, or `effect.parameter`.
-
-    Raises:
-        InputError: holds everything that is wrong with the table.
+    Units are those of every parameter that it may hold. With `effects` it may hold
+    parameters of effects, unchecked: a table for each effect, or `effect.parameter`.
     """
     priors: dict[str, Prior] = {}
     with Findings() as wrong:
@@ -216,9 +197,9 @@ def read_entries(
                 remedy += "; or a table for each effect" if effects else ""
                 wrong.append(toml.finding(words, remedy, key))
                 continue
-            for parameter, (one, place) in entries.items():
+            for parameter, (stated, place) in entries.items():
                 unit = units.get(parameter)
-                if prior := wrong.attempt(read_prior, one, place, toml, unit):
+                if prior := wrong.attempt(read_prior, stated, place, toml, unit):
                     priors[parameter] = prior
     return priors
 
@@ -226,11 +207,7 @@ def read_entries(
 def read_priors(
     source: Traversable | Path, units: Mapping[str, str], file: str = ""
 ) -> dict[str, Prior]:
-    """Read a prior file, in which the top-level tables are parameters.
-
-    Raises:
-        InputError: holds everything that is wrong with the file.
-    """
+    """Read a prior file, in which the top-level tables are parameters."""
     toml = read_toml(source, file or source.name)
     words = ("name", "description")
     table = {name: entry for name, entry in toml.table.items() if name not in words}
@@ -274,11 +251,7 @@ def material_names() -> list[str]:
 
 
 def material_priors(name: str) -> dict[str, Prior]:
-    """Return priors and facts of a shipped material, keyed as `MATERIAL_UNITS`.
-
-    Raises:
-        InputError: no such material.
-    """
+    """Return priors and facts of a shipped material, keyed as `MATERIAL_UNITS`."""
     if name not in material_names():
         remedy = did_you_mean(name, material_names())
         raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
@@ -286,11 +259,7 @@ def material_priors(name: str) -> dict[str, Prior]:
 
 
 def read_material(source: Path, file: str) -> dict[str, Prior]:
-    """Read the file of a material, keyed as `MATERIAL_UNITS`.
-
-    Raises:
-        InputError: holds everything that is wrong with it, also what it lacks.
-    """
+    """Read the file of a material, keyed as `MATERIAL_UNITS`."""
     facts = read_priors(source, MATERIAL_UNITS, file)
     lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
     if lacking:

@@ -32,7 +32,6 @@ def read_case(
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
     columns: Mapping[str, str] | None = None,
-    theory: str | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
     specimen: str | None = None,
@@ -42,9 +41,8 @@ def read_case(
     """Read a case from a file, a folder or a table in memory.
 
     Args:
-        data: a CSV file, workbook (.xlsx) or Parquet file, or a folder holding data.csv
-            and gear.toml; or a DataFrame, or arrays by name, under the headers of such
-            files.
+        data: a CSV file, workbook (.xlsx) or Parquet file, a folder holding data.csv
+            and gear.toml, or a DataFrame, or arrays by header.
         gear: a gear file, or its content as a mapping, as in
             `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
             default the gear.toml next to the data, and without one a spring of which
@@ -52,7 +50,6 @@ def read_case(
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
-        theory: overrides the gear file's theory.
         encoding: encoding of a CSV file; by default the likeliest.
         sheet: sheet of a workbook; by default the one with readings.
         specimen: label of the only one that is read; by default all of them.
@@ -78,7 +75,7 @@ def read_case(
         # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
         nearby = None if in_memory else Path(table).parent / GEAR_NAME
-        described = of_gear.attempt(gear_of, gear, nearby, folder, theory)
+        described = of_gear.attempt(gear_of, gear, nearby, folder)
         known = None if described is None else described[0]
         named = columns if known is None else known.source.get("columns", {}) | columns
         how: dict = {"sheet": sheet, "gear": known, "skip_bad": skip_bad}
@@ -108,7 +105,6 @@ def asked_columns(
 
 
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
-    """Return the name of the case, or of its folder, after file and parts."""
     name = (data.resolve().name if folder else data.stem) or "case"
     texts = (str(part).strip() for part in parts if part is not None)
     return "-".join([name, *(_NO_NAME.sub("_", text) for text in texts)])
@@ -118,22 +114,15 @@ def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     nearby: Path | None,
     folder: bool,
-    theory: str | None,
 ) -> tuple[Gear, tuple[str, ...]]:
-    """Return the gear of a case, and notes on its source.
-
-    A gear file may be at the place `nearby`, and must be there in a folder.
-    """
+    """Return the gear of a case, and notes; a folder must hold the file `nearby`."""
     notes = []
     if gear is None and nearby is not None and (folder or os.path.exists(nearby)):
         gear = nearby
         notes += [] if folder else [_NEARBY]
     if gear is not None:
-        known = read_gear(gear, theory)
+        known = read_gear(gear)
         return known, (*_defaults(known), *notes)
-    if theory not in (None, SPRING):
-        words = "this needs sizes, and there is no gear file"
-        raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
     return read_gear({"name": "part", "theory": SPRING}), (UNSIZED,)
 
 

@@ -1,8 +1,4 @@
-"""The measured records and the gear's geometry, as typed pytrees.
-
-Units inside hdcal are mm, N, MPa, degrees Celsius, seconds and radians; they
-are consistent, so nothing below the reading edge converts.
-"""
+"""The measured records and the gear's geometry, in mm, N, MPa, °C, s and rad."""
 
 from typing import Any
 
@@ -51,7 +47,7 @@ class Records(_InDoublePrecision):
 
     Attributes:
         deformation: as read [mm], radial or diametral by the gear file.
-        temperature: specimen temperature [°C]; the reference one when not measured.
+        temperature: of the specimen [°C]; the reference one when not measured.
         time: since the reset of the row's run [s]; 0 when not measured.
         angle: rotation of the specimen under the load [rad]; 0 when not measured.
         direction: +1 loading, 0 holding, -1 unloading.
@@ -59,13 +55,11 @@ class Records(_InDoublePrecision):
             has that of the branch its force fits.
         rate: deformation rate [mm/s]; 0 without time.
         run: index of the mounting.
-        specimen: index of the gear.
         force: as read [N].
         force_sd: known measurement sd [N]; 0 when not given.
-        known: names of what was measured or is present in the loading:
-            temperature, time, angle, force_sd, run, specimen (two or more labels),
-            unloading, holds, rates, holds or rates, cycles, runs and specimens (three
-            or more).
+        known: what was measured or is present in the loading: temperature, time, angle,
+            force_sd, run, specimen (two or more labels), runs, specimens (three or
+            more), unloading, holds, rates, holds or rates, cycles.
     """
 
     deformation: Float[Array, " n"]

@@ -31,11 +31,6 @@ def pages() -> dict[str, Traversable]:
 
 
 def _shipped(name: str) -> Traversable:
-    """Return a folder of the installed package, or of a checkout.
-
-    Raises:
-        FileNotFoundError: there is none.
-    """
     # pathlib.Path and zipfile.Path both know their parent; Traversable does not.
     data: Any = files("hdcal.data")
     package = data.parent

@@ -1,4 +1,4 @@
-"""Whether readings scatter at all, and the least that they can."""
+"""Whether readings scatter at all."""
 
 import numpy as np
 
@@ -6,16 +6,14 @@ from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
 from hdcal.errors import Finding, InputError
 
-# Shares of the range of forces that are no more than rounding of what was computed.
+# Share of the forces that is no more than rounding of what was computed.
 _NOTHING = 1e-8
 
 
 def require_scatter(case: Case) -> None:
-    """Refuse readings without scatter, where nothing else states their noise.
+    """Raise InputError for readings on straight lines to the last digit.
 
-    Raises:
-        InputError: they lie on straight lines to the last digit, and neither the step
-            of the display nor an sd of any row is stated.
+    Not where the step of the display or the sd of a row is stated.
     """
     records = case.records
     if case.gear.force_resolution > 0.0 or np.any(np.asarray(records.force_sd) > 0.0):
@@ -31,19 +29,6 @@ def require_scatter(case: Case) -> None:
     remedy = "To readings that were computed, add noise; of a display, state the step "
     remedy += "as force_resolution_N under [measurement] of the gear file"
     raise InputError([Finding(case.name, words, remedy)])
-
-
-def reading_step(case: Case) -> float:
-    """Return the step of the force display, or else `least_step` [N]."""
-    return case.gear.force_resolution or least_step(case.records.force)
-
-
-def least_step(force) -> float:
-    """Return the least difference of two forces [N]; zero where all are the same."""
-    force = np.asarray(force)
-    steps = np.diff(np.unique(force))
-    steps = steps[steps > _NOTHING * np.max(np.abs(force))] if len(steps) else steps
-    return float(np.min(steps)) if len(steps) else 0.0
 
 
 def left_of_lines(records: Records, values: np.ndarray) -> np.ndarray:

@@ -1,8 +1,4 @@
-"""The theories by name: what a gear file may ask for, and what reports call it.
-
-Each has its formula in `hdcal.physics.theory`. Under `SPRING` K is the stiffness
-itself: it needs no sizes, and no other theory says what its K would be.
-"""
+"""The theories of `hdcal.physics.theory` by name; `SPRING` has a stiffness alone."""
 
 from typing import Literal
 
@@ -14,5 +10,4 @@ THEORY_WORDS: dict[str, str] = {
     "article": "slope plotted in the article",
     "spring": "a stiffness without sizes",
 }
-# What a deformation may be as it is read.
-READINGS = "radial", "diametral"
+READINGS = "radial", "diametral"  # what a deformation may be as it is read

@@ -69,8 +69,7 @@ SIZES: dict[str, dict[str, float]] = {
     },
     "temperature": {"C °C degC celsius": 1.0, "K": 1.0, "F °F degF": 5.0 / 9.0},
 }
-# Reading in a unit at the zero of °C.
-_ZEROS = {"K": 273.15, "F": 32.0}
+_ZEROS = {"K": 273.15, "F": 32.0}  # reading in a unit at the zero of °C
 # Further units of priors: sizes in N, mm, s and K, and their powers.
 _OF_PRIORS = {
     "MPa": (1.0, (1, -2, 0, 0)),
@@ -101,19 +100,12 @@ _LONGEST = 60
 
 
 class Unit(NamedTuple):
-    """Unit of a column.
-
-    Attributes:
-        name: its usual spelling.
-        dimension: a key of `SIZES`.
-        size: in the first unit of that dimension.
-        zero: reading in this unit at the zero of that one.
-    """
+    """Unit of a column; the dimension is a key of `SIZES`."""
 
     name: str
     dimension: str
-    size: float
-    zero: float = 0.0
+    size: float  # in the first unit of the dimension
+    zero: float = 0.0  # reading in this unit at the zero of that one
 
     def convert(self, values: np.ndarray) -> np.ndarray:
         """Convert values, shape (n,), into mm, N, N*m, rad, s or °C."""
@@ -141,17 +133,10 @@ def find_unit(text: str) -> Unit | None:
     return UNITS.get(bare) or UNITS.get(re.sub(r"[\s·⋅*.-]", "", bare))
 
 
-def unit_names(dimension: str) -> list[str]:
-    """Return the usual spellings of the units of a dimension."""
-    return [names.split()[0] for names in SIZES[dimension]]
-
-
 def to_code(unit: str) -> tuple[float, str]:
-    """Read a unit such as `GPa`, `1e-4/K` or `N*s/mm^2`; a degree is a difference.
+    """Return the factor to code units of a unit such as `N*s/mm^2`, and their name.
 
-    Returns:
-        The factor that takes a number in `unit` to code units, and the name of
-        that code unit (`MPa`, `1/K`, ...; `1` when dimensionless).
+    A degree is a difference. The name is `MPa`, `1/K`, ...; `1` when dimensionless.
 
     Raises:
         UnitError: the text is not a product of known mechanical units.
@@ -193,7 +178,6 @@ def _product(unit: str) -> tuple[float, tuple[int, ...]]:
 
 
 def _factor(part: str, unit: str) -> tuple[float, tuple[int, ...]]:
-    """Scale of one factor, and its powers of the code units."""
     if _NUMBER.fullmatch(part):
         if not float(part) > 0.0:
             raise UnitError(f"'{unit}' has a scale of zero")

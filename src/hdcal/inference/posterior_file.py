@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from hdcal.data.regular_file import why_not_readable
+from hdcal.data.findings import why_not_readable
 from hdcal.errors import Finding, InputError, NotUsable
 
 FILE_NAME = "posterior.nc"

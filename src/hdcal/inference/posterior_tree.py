@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.full_scale import FullScale
+from hdcal.data.prior import FullScale
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.quantities import BY_LOAD, FORCE, Quantities

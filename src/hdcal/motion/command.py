@@ -67,7 +67,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
 
     Units are N, mm, s, kg, N·s/mm. The motion begins at rest.
     """
-    from hdcal.data.measurements.force_table import read_force
+    from hdcal.data.measurements.measurements import read_force
     from hdcal.inference.model_average import load_models
     from hdcal.motion.dynamic_problem import DynamicPosterior
     from hdcal.motion.respond import STEP

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from hdcal.data.full_scale import REFERENCE
+from hdcal.data.prior import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.priors import without_scatter

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.data.formula_cells import without_formula
+from hdcal.data.tables.cells import without_formula
 
 
 def columns_csv(columns: Mapping[str, Any]) -> str:

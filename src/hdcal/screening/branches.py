@@ -22,20 +22,17 @@ from hdcal.screening.straight_pieces import (
 )
 from hdcal.screening.turning_points import turning_points
 
-# Rows from which on a line has a slope and scatter.
-_FEWEST = 5
+_FEWEST = 5  # rows from which on a line has a slope and scatter
 # A movement over this share of the range is a branch; from so many on they are cycles,
 # of which so many are looked at.
 _BRANCH, _CYCLES, _MOST_MOVEMENTS = 0.1, 3, 12
 # A run goes to both sides when it goes this share of one way the other way too.
 _BOTH_SIDES = 0.5
-# A hold has so many times as many rows of one reading as a movement.
-_HOLD = 3.0
+_HOLD = 3.0  # a hold has so many times as many rows of one reading as a movement
 # Movements share a straight part from this share of the longest one on; it is parallel
 # where slopes differ by no more than so many standard errors.
 _SHARED, _APART = 0.5, 3.0
-# A movement is large from this share of the largest force on.
-_LARGE = 0.5
+_LARGE = 0.5  # a movement is large from this share of the largest force on
 
 
 def name_segments(one: Run) -> None:
@@ -153,10 +150,7 @@ def _slope(one: Run, part: np.ndarray, inflation: float) -> tuple[float, float]:
 
 
 def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return where the movement turns, and its first sign, as `turning_points` does.
-
-    Where the gauge of the deformation trembles, the force tells better.
-    """
+    """Return the turns of the deformation, or of the force if its gauge trembles."""
     scatter = 10.0 * one.scatter
     for values in (one.x[rows], one.y[rows]):
         least = max(_BRANCH * float(np.ptp(values)), scatter)
@@ -167,10 +161,7 @@ def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _line(x: np.ndarray, y: np.ndarray, scatter: float) -> tuple[float, float]:
-    """Return the slope of a line and its standard error.
-
-    Scatter of the deformation, of a known size, is allowed for.
-    """
+    """Return a slope and its standard error, corrected for the scatter of x."""
     x, y = x - x.mean(), y - y.mean()
     square = float(x @ x)
     true = max(square - x.size * scatter**2, 0.1 * square)

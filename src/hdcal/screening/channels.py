@@ -9,21 +9,13 @@ from hdcal.screening.turning_points import turning_points
 
 # Digits are finer than this share of the range, or a value repeats by itself.
 _DIGITS = 2e-3
-# Readings of the very same value in a row.
-_FEWEST_HELD = 5
-# Share of its range by which the other channel has to move meanwhile.
-_MOVES = 0.1
-# It has to go on at least at this share of its pace before.
-_PACE = 0.5
+_FEWEST_HELD = 5  # readings of the very same value in a row
+_MOVES = 0.1  # share of its range by which the other channel has to move meanwhile
+_PACE = 0.5  # it has to go on at least at this share of its pace before
 
 
 def saturated_rows(held: np.ndarray, moving: np.ndarray) -> np.ndarray:
-    """Return rows at which a channel stands at its largest or smallest reading.
-
-    Args:
-        held: the channel that may be saturated, shape (n,).
-        moving: the other one, shape (n,).
-    """
+    """Return rows at which a channel stands at its largest or smallest reading."""
     steps = np.diff(np.unique(held))
     if not steps.size or np.min(steps) > _DIGITS * np.ptp(held):
         return np.array([], int)
@@ -54,13 +46,10 @@ def _plateau(held: np.ndarray, moving: np.ndarray) -> np.ndarray:
     return found
 
 
-# Rows that are averaged into one, to see the slope without the scatter.
-_BLOCKS = 12
+_BLOCKS = 12  # rows that are averaged into one, to see the slope without the scatter
 _FEWEST_ROWS = 40
-# So many second differences tell whether there is scatter.
-_MOST_PARTS = 100_000
-# Probability of a false alarm in a record without scatter.
-_LEVEL = 1e-4
+_MOST_PARTS = 100_000  # so many second differences tell whether there is scatter
+_LEVEL = 1e-4  # probability of a false alarm in a record without scatter
 # The scatter matters when it bends a straight line by more than this share.
 _MATTERS = 1e-3
 # Least correlation, with the other sign, of second differences with the next ones.

@@ -15,45 +15,40 @@ from hdcal.screening.local_fit import (
 )
 from hdcal.screening.turning_points import noise_sd
 
-# Share of the tested range within which the deformation counts as at rest.
-_REST = 0.01
+_REST = 0.01  # share of the tested range within which the deformation counts as at rest
 # A gauge is zeroed by a step this many times as large as those of the test.
 _ZEROED = 10.0
-# A tare lies in this share of the first rows at most.
-_EARLY = 0.25
+_EARLY = 0.25  # a tare lies in this share of the first rows at most
 # A smaller step of the force, as a share of its range, is left in the record.
 _LEAST = 0.02
 # The part has given way when the force has fallen by this share of its range; less
 # is a serrated yield or the wear of a loop.
 _DROP = 0.05
-# Rows on each side that are averaged at most.
-_SMOOTH = 50
-# Seen in one row only, by so much.
-_GONE = 0.5
+_SMOOTH = 50  # rows on each side that are averaged at most
+_GONE = 0.5  # seen in one row only, by so much
 # Share of the range that counts as a movement back, and share of a usual step that
 # counts as a step on.
 _BACK, _ADVANCE = 0.1, 0.25
 # A part that gives way after cycles does so by a step of this share of the range and
 # of so many usual steps, and stays below what it was at most deformations.
 _SHARP, _STEPS, _MOSTLY = 0.3, 20.0, 0.9
-# Places along the deformation at which before and after are compared.
-_PLACES = 50
-# Rows from which on a curve before the drop can be calibrated.
-_FEWEST = 5
+_PLACES = 50  # places along the deformation at which before and after are compared
+_FEWEST = 5  # rows from which on a curve before the drop can be calibrated
 
 
 def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
     """Return how many first rows were read before the tare, its step and the unit.
 
-    Before a tare nothing moves; then the force steps to another level while the
-    deformation stays, or the deformation while the force stays.
+    Before a tare nothing moves; then one channel steps while the other one stays.
     """
     last = int(_EARLY * x.size)
     if last < 2:
         return 0, 0.0, ""
     rows = looked_at(x, y)
     rows = rows[rows > 0]
-    typical = float(median(slopes(*_sample(x, y))[None].reshape(1, -1), 0.0)[0])
+    sample = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
+    near_x, near_y = (windows(values, sample, np.arange(-5, 5)) for values in (x, y))
+    typical = float(median(slopes(near_x, near_y).ravel(), 0.0))
     rise, run = (values[rows] - values[rows - 1] for values in (y, x))
     step = rise - typical * run
     usual = Usual.of(step, resolution(y))
@@ -72,13 +67,6 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
             size = run[place] if zeroed else step[place]
             return int(row), float(size), "mm" if zeroed else "N"
     return 0, 0.0, ""
-
-
-def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return windows of ten rows over the whole record."""
-    rows = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
-    offsets = np.arange(-5, 5)
-    return windows(x, rows, offsets), windows(y, rows, offsets)
 
 
 def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:

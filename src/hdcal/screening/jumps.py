@@ -16,33 +16,24 @@ from hdcal.screening.local_fit import (
 )
 from hdcal.screening.turning_points import noise_sd, turning_points
 
-# Rows needed on each side of a jump; from fewer it could be anything.
-SIDE = 4
+SIDE = 4  # rows needed on each side of a jump; from fewer it could be anything
 # A smaller jump, as a share of the tested range, is left to the model's noise.
 LEAST = 0.02
 # A window moves one way when this share of its way is progress, and rests when it
 # covers less than the second share of what windows usually do.
 _PROGRESS, _RESTS = 0.6, 0.25
-# Any other step about a jump is at most this share of it.
-_OTHERS = 0.5
+_OTHERS = 0.5  # any other step about a jump is at most this share of it
 _NEAR = np.r_[1 - REACH : 0, 1:REACH]
-# Places that are tried.
-_TRIED = 5
-# Slopes on both sides agree when they differ by less than this share.
-_ALIKE = 0.5
-# Share of the gap between both sides of a jump that one step makes.
-_ONE_STEP = 0.8
-# Share of the range within which nothing moves.
-_STILL = 0.02
+_TRIED = 5  # places that are tried
+_ALIKE = 0.5  # slopes on both sides agree when they differ by less than this share
+_ONE_STEP = 0.8  # share of the gap between both sides of a jump that one step makes
+_STILL = 0.02  # share of the range within which nothing moves
 # Both channels jumped when one leaves its sequence at least this share as far, and by
 # this many usual steps.
 _BOTH, _FAR = 0.2, 10.0
-# Standard errors from which on a slope is known.
-_KNOWN = 5.0
-# Standard errors of a slope that two sides of a jump may differ by.
-_UNSURE = 3.0
-# Share of the movement that must be more than scatter.
-_REAL = 0.2
+_KNOWN = 5.0  # standard errors from which on a slope is known
+_UNSURE = 3.0  # standard errors of a slope that two sides of a jump may differ by
+_REAL = 0.2  # share of the movement that must be more than scatter
 # Movements over this share of the range make a cycle, in so many of which a zero shows.
 _CYCLE, _CYCLES = 0.1, 3
 # A step that no movement explains is so many times as long as the larger range, or

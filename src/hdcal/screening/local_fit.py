@@ -14,8 +14,9 @@ MOST_ROWS = 2000
 # No rig resolves a smaller share of the tested range, and no departure below it
 # changes a stiffness by more than some parts in ten thousand.
 RESOLVED = 1e-4
-# So many values show the range and the last digit.
-_SOME = 4000
+_SOME = 4000  # so many values show the range and the last digit
+# Share of the range that is no more than rounding of what was computed.
+_ROUNDING = 1e-8
 # Quotient of the 95 % and the 50 % quantile of |t|, by degrees of freedom.
 _DOFS = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 8.0])
 _TAILS = np.array([12.7, 5.27, 4.16, 3.75, 3.54, 3.26])
@@ -28,15 +29,10 @@ _ODDS = 5.0
 
 @dataclass(frozen=True)
 class Usual:
-    """What a statistic usually is in this record: Student's t about zero.
-
-    Attributes:
-        scale: in the unit of the statistic.
-        dof: degrees of freedom; few where the tail is heavy.
-    """
+    """What a statistic usually is in this record: Student's t about zero."""
 
     scale: float
-    dof: float
+    dof: float  # degrees of freedom; few where the tail is heavy
 
     @classmethod
     def of(cls, values: np.ndarray, least: float) -> "Usual":
@@ -90,10 +86,14 @@ def spread(values: np.ndarray) -> float:
 def resolution(values: np.ndarray) -> float:
     """Return the smallest departure that counts: a digit, or a share of the range."""
     values = values[:: max(1, values.size // _SOME)]
-    least = RESOLVED * spread(values)
-    fine = 1e-9 * float(np.ptp(values)) or 1.0
-    steps = np.diff(np.unique(np.round(values / fine)))
-    return max(least, float(steps.min(initial=np.inf)) * fine if steps.size else least)
+    return max(RESOLVED * spread(values), least_step(values))
+
+
+def least_step(values: np.ndarray) -> float:
+    """Return the smallest difference of two values; 0 where all are the same."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > _ROUNDING * steps.sum()]
+    return float(steps.min()) if steps.size else 0.0
 
 
 def windows(values: np.ndarray, rows: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -43,36 +43,23 @@ LEAST_DIFFERENCE = 0.1
 # A testing machine of class 0.5 may err by this share of the force (ISO 7500-1): a
 # curve that bends by less is a straight line, and slopes that differ by less are one.
 MACHINE_CLASS = 0.005
-# Half a 95 % interval of a normal distribution, in sds.
-NORMAL_95 = 1.96
+NORMAL_95 = 1.96  # half a 95 % interval of a normal distribution, in sds
 # First and last row of each stretch of rows.
 Stretches = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
 class Observation:
-    """One finding in the record.
-
-    Attributes:
-        kind: kind of the finding.
-        rows: first and last row of each stretch that it concerns, from 0.
-        size: its size, in `unit`.
-        unit: unit of the size.
-        action: what was done about it.
-        run: index of the run.
-        where: the rows as their file names them.
-        words: the finding in a sentence without a full stop.
-        gear: label of the gear.
-    """
+    """One finding in the record, and what was done about it."""
 
     kind: Kind
-    rows: Stretches
+    rows: Stretches  # from 0
     size: float
     unit: str
     action: Action
     run: int = 0
-    where: str = ""
-    words: str = ""
+    where: str = ""  # the rows as their file names them
+    words: str = ""  # a sentence without a full stop
     gear: str = ""
 
     @property
@@ -83,62 +70,35 @@ class Observation:
 
 @dataclass(frozen=True)
 class StraightPart:
-    """The longest straight part of the largest movement of a run.
+    """The longest straight part of the largest movement of a run."""
 
-    Attributes:
-        low: smallest deformation, as read [mm].
-        high: largest deformation, as read [mm].
-        rows: rows of the part, without those of other branches, shape (n,).
-        slope: slope of the force over the deformation, by least squares [N/mm].
-        slope_sd: its standard error [N/mm].
-        whole: whether every movement of the run is straight.
-    """
-
-    low: float
+    low: float  # smallest and largest deformation, as read [mm]
     high: float
-    rows: np.ndarray
-    slope: float
-    slope_sd: float
-    whole: bool
+    rows: np.ndarray  # mask without rows of other branches, shape (n,)
+    slope: float  # of the force over the deformation, by least squares [N/mm]
+    slope_sd: float  # its standard error [N/mm]
+    whole: bool  # whether every movement of the run is straight
 
 
 @dataclass(frozen=True)
 class Screening:
-    """A record after screening; arrays have the shape (n,).
-
-    Attributes:
-        observations: findings in the order of the record.
-        segment: index into `SEGMENTS` of each row.
-        kept: which rows stay in the record.
-        deformation: with each jump of its zero taken out [mm].
-        force: likewise, turned where its sign was opposite [N].
-        zero: number of jumps of a zero before each row in its run.
-        deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
-        trembling: whether that scatter hides the direction of the movement.
-        straight: longest straight part of a single run; None of several runs, and where
-            too few rows are left.
-        working_range: in words; empty where none is stated.
-        straight_in_range: longest straight part within a range chosen by its ends.
-    """
+    """A record after screening; arrays have the shape (n,)."""
 
     observations: tuple[Observation, ...]
-    segment: np.ndarray
+    segment: np.ndarray  # index into `SEGMENTS`
     kept: np.ndarray
-    deformation: np.ndarray
-    force: np.ndarray
-    zero: np.ndarray
-    deformation_sd: float = 0.0
-    trembling: bool = False
-    straight: StraightPart | None = None
-    working_range: str = ""
-    straight_in_range: StraightPart | None = None
+    deformation: np.ndarray  # with each jump of its zero taken out [mm]
+    force: np.ndarray  # likewise, turned where its sign was opposite [N]
+    zero: np.ndarray  # number of jumps before each row in its run
+    deformation_sd: float = 0.0  # scatter of the gauge [mm]; 0 where none shows
+    trembling: bool = False  # the scatter hides the direction of the movement
+    straight: StraightPart | None = None  # of a single run with rows enough
+    working_range: str = ""  # in words; empty where none is stated
+    straight_in_range: StraightPart | None = None  # of a range chosen by its ends
 
     @property
     def excluded(self) -> tuple[tuple[float, float], ...]:
-        """Deformations of rows that were left out, beyond those that stayed [mm].
-
-        Where the force has dropped for good all that lies farther is excluded.
-        """
+        """Deformations [mm] beyond those that stayed; all of them after a drop."""
         x, found = self.deformation, []
         low, high = float(x[self.kept].min()), float(x[self.kept].max())
         for segment, without_end in ((DROPPED, True), (OUTSIDE, False)):
@@ -162,7 +122,7 @@ class Screening:
     @property
     def asked(self) -> tuple[Observation, ...]:
         """Findings that only the user can decide about."""
-        return tuple(one for one in self.observations if one.action == "asked")
+        return tuple(o for o in self.observations if o.action == "asked")
 
 
 def stretches(rows: np.ndarray | Sequence[int]) -> Stretches:

@@ -19,10 +19,8 @@ from hdcal.screening.result import (
 )
 from hdcal.screening.wild import FEWEST, wild_readings
 
-# More jumps than this are no faults of a zero but what the part does.
-_MOST_JUMPS = 4
-# A larger share of wild readings is noise with heavy tails.
-_MOST_WILD = 0.1
+_MOST_JUMPS = 4  # more jumps than this are no faults of a zero but what the part does
+_MOST_WILD = 0.1  # a larger share of wild readings is noise with heavy tails
 # Share of the readings that stand in the usual number of rows, or in one more or less,
 # where the logger is faster than the gauges.
 _REGULAR = 0.9
@@ -35,37 +33,24 @@ _JUMPS: dict[str, tuple[Kind, str]] = {
 
 @dataclass
 class Run:
-    """One run on its way through the screening; arrays are of its rows, shape (r,).
-
-    Attributes:
-        index: index of the run.
-        rows: its rows in the whole record, in order.
-        x: deformation, with each jump of its zero taken out.
-        y: force, likewise.
-        segment: index into `SEGMENTS`.
-        kept: which rows stay.
-        zero: number of jumps before each row.
-        scatter: sd of the deformation's reading; 0 where none shows.
-        plain: whether a straight line explains it.
-        observations: findings so far.
-    """
+    """One run on its way through the screening, as in `Screening`; shape (r,)."""
 
     index: int
-    rows: np.ndarray
+    rows: np.ndarray  # in the whole record
     x: np.ndarray
     y: np.ndarray
     segment: np.ndarray
     kept: np.ndarray
     zero: np.ndarray
-    scatter: float = 0.0
-    plain: bool = False
+    scatter: float = 0.0  # sd of the deformation's reading; 0 where none shows
+    plain: bool = False  # whether a straight line explains it
     observations: list[Observation] = field(default_factory=list)
 
     @classmethod
     def of(
         cls, rows: np.ndarray, x: np.ndarray, y: np.ndarray, index: int = 0
     ) -> "Run":
-        """Return rows of a record with deformation x and force y, (n,), all kept."""
+        """Return some rows of a record, all kept."""
         segment, zero = np.zeros((2, rows.size), int)
         kept = np.ones(rows.size, bool)
         return cls(index, rows, x[rows], y[rows], segment, kept, zero)
@@ -75,8 +60,8 @@ class Run:
     ) -> None:
         """Add an observation of some rows of the run."""
         where = stretches(self.rows[rows])
-        found = Observation(kind, where, float(size), unit, action, self.index)
-        self.observations.append(found)
+        observed = Observation(kind, where, float(size), unit, action, self.index)
+        self.observations.append(observed)
 
     def cut(self, rows: np.ndarray, segment: int) -> None:
         """Take rows out of the record."""
@@ -93,13 +78,9 @@ class Run:
 
     def with_repeats(self, rows: np.ndarray) -> np.ndarray:
         """Return rows with those after each that just repeat it."""
-        distinct = self.distinct()
-        starts = np.searchsorted(distinct, rows)
-        stops = np.r_[distinct, self.x.size][starts + 1]
-        pairs = zip(rows, stops, strict=True)
-        found = [np.arange(first, stop) for first, stop in pairs]
-        whole = np.concatenate(found) if found else np.array([], int)
-        return whole[self.kept[whole]]
+        kept, distinct = np.flatnonzero(self.kept), self.distinct()
+        first = distinct[np.searchsorted(distinct, kept, "right") - 1]
+        return kept[np.isin(first, rows)]
 
 
 def look_at(one: Run) -> None:
@@ -122,10 +103,7 @@ def look_at(one: Run) -> None:
 
 
 def _repeats(one: Run) -> None:
-    """Leave out rows that repeat a reading, where a logger is faster than its gauges.
-
-    Each reading then stands in as many rows; a hold has as many as it takes.
-    """
+    """Leave out rows that repeat a reading of a logger faster than its gauges."""
     kept, rows = np.flatnonzero(one.kept), one.distinct()
     times = np.diff(np.searchsorted(kept, rows))
     if rows.size < FEWEST or np.median(times) < 2.0:
@@ -157,8 +135,7 @@ def _saturation(one: Run) -> None:
         found = saturated_rows(held, moving)
         if found.size:
             one.cut(rows[found], SATURATED)
-            size = float(held[found[0]])
-            one.observe(kind, rows[found], size, unit, "cut")
+            one.observe(kind, rows[found], float(held[found[0]]), unit, "cut")
 
 
 def _scatter(one: Run) -> float:
@@ -173,8 +150,8 @@ def _wild(one: Run) -> None:
         return
     wild = one.with_repeats(rows[found])
     one.cut(wild, WILD)
-    size = float(off[np.argmax(np.abs(off))])
-    one.observe("wild reading", wild, size, "N", "cut")
+    largest = float(off[np.argmax(np.abs(off))])
+    one.observe("wild reading", wild, largest, "N", "cut")
 
 
 def _jumps(one: Run) -> bool:

@@ -10,13 +10,12 @@ from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
 from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run, look_at
-from hdcal.screening.turning_points import turning_points
+from hdcal.screening.turning_points import rows_of_runs, turning_points
 from hdcal.screening.wild import FEWEST
 from hdcal.screening.working_range import WorkingRange
 
 Sign = Literal["same", "opposite", "unclear", "unknown"]
-# A movement over this share of the range is a branch of the curve.
-_BRANCH = 0.2
+_BRANCH = 0.2  # a movement over this share of the range is a branch of the curve
 # Rank correlation from which on force and deformation surely go together, and the
 # standard errors beyond which it is no chance.
 _CLEAR = 0.9
@@ -26,10 +25,8 @@ _MOST_ROWS = 40
 # What the residuals of a line with independent noise rarely exceed: the largest one,
 # in sd, and the correlation of each with the next one, in its standard errors.
 _LARGEST, _CORRELATED = 2.8, 2.0
-# Share of the range of the force that is noise at most.
-_NOISE = 0.05
-# Rows that show the sign of a slope.
-_FEWEST_FOR_SIGN = 5
+_NOISE = 0.05  # share of the range of the force that is noise at most
+_FEWEST_FOR_SIGN = 5  # rows that show the sign of a slope
 
 
 def screen(
@@ -44,8 +41,8 @@ def screen(
 
     Args:
         deformation: as read [mm], in the order it was taken, shape (n,).
-        force: as read [N], shape (n,).
-        run: index of the mounting, shape (n,); by default one.
+        force: as read [N].
+        run: index of the mounting; by default one.
         whole: whether these are all runs. Of some of them nobody knows whether the sign
             is opposite in every run, so that it is asked about and not turned.
         wanted: working range. Where force and deformation grow together in it, the sign
@@ -54,11 +51,9 @@ def screen(
     x, y = np.array(deformation, float), np.array(force, float)
     n = x.size
     index = np.zeros(n, int) if run is None else np.asarray(run)
-    order = np.argsort(index, kind="stable")
-    cuts = np.flatnonzero(np.diff(index[order])) + 1
     runs = []
     plain = plain_runs(x, y, index)
-    for rows in np.split(order, cuts) if n else []:
+    for rows in rows_of_runs(index):
         one = Run.of(rows, x, y, int(index[rows[0]]))
         one.plain = bool(plain[one.index])
         look_at(one)
@@ -70,7 +65,6 @@ def screen(
 
 
 def _gathered(runs: list[Run], n: int) -> Screening:
-    """Return the screened runs as one record."""
     columns = {name: np.zeros(n) for name in ("x", "y", "segment", "kept", "zero")}
     for one in runs:
         for name, values in columns.items():
@@ -101,7 +95,8 @@ def _signs(runs: list[Run], wanted: WorkingRange | None, *, whole: bool) -> None
         if sign == "same" or (sign == "unknown" and not turned):
             continue
         rows = np.flatnonzero(one.kept)
-        slope = _rough_slope(one.x[rows], one.y[rows])
+        x, y = one.x[rows], one.y[rows]
+        slope = float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])
         if turned:
             one.y = -one.y
             one.observe("opposite sign", rows, slope, "N/mm", "turned")
@@ -145,10 +140,6 @@ def _inside(wanted: WorkingRange | None, x: np.ndarray, y: np.ndarray) -> np.nda
         if inside.sum() >= _FEWEST_FOR_SIGN:
             return inside
     return np.ones(x.size, bool)
-
-
-def _rough_slope(x: np.ndarray, y: np.ndarray) -> float:
-    return float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])
 
 
 def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:

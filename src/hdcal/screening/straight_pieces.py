@@ -8,16 +8,14 @@ import numpy as np
 from hdcal.screening.local_fit import RESOLVED
 from hdcal.screening.turning_points import noise_sd
 
-# Rows of a movement that show whether it is straight.
-SHOWN = 20
+SHOWN = 20  # rows of a movement that show whether it is straight
 # The curve is cut into straight pieces between this many points, means of rows.
 _POINTS = 120
 _PIECES = 6
 # A piece within the curve has at least this many points, so that it has a slope and
 # scatter; the first and the last may be shorter, as a preload or a tare is.
 _FEWEST_POINTS = 4
-# Price of one more piece: a slope, a level and a place.
-_PARAMETERS = 3.0
+_PARAMETERS = 3.0  # price of one more piece: a slope, a level and a place
 # Share of a piece that is left out where it meets another one: the place of a cut is
 # known to some points only, and a curve that bends gradually has none.
 _MARGIN = 0.1
@@ -28,17 +26,11 @@ _FEWEST_FOR_MEMORY = 10 * _PIECES
 
 
 class Straight(NamedTuple):
-    """The longest straight part of a movement.
+    """The longest straight part of a movement."""
 
-    Attributes:
-        rows: rows of the movement.
-        whole: whether it is the whole curve.
-        inflation: factor on the variance of its slope, by correlated neighbours.
-    """
-
-    rows: slice
-    whole: bool
-    inflation: float = 1.0
+    rows: slice  # of the movement
+    whole: bool  # whether it is the whole curve
+    inflation: float = 1.0  # of the variance of its slope, by correlated neighbours
 
 
 def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Straight:
@@ -49,10 +41,9 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
     deformation together, so that neither an approach without force nor a yield
     without a rise of it counts for much.
     """
-    points = min(_POINTS, x.size)
-    if points < 2 * _FEWEST_POINTS:
+    if x.size < 2 * _FEWEST_POINTS:
         return Straight(slice(0, x.size), True)
-    edges = _edges_of(x.size, points)
+    edges = _edges_of(x.size)
     px, py = _means(x, edges), _means(y, edges)
     span_x, span_y = np.ptp(px), np.ptp(py)
     if not span_x or not span_y:
@@ -75,10 +66,9 @@ def longest_straight(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Stra
     return Straight(inner, len(cuts) == 2, inflation)
 
 
-def _edges_of(rows: int, points: int = _POINTS) -> np.ndarray:
+def _edges_of(rows: int) -> np.ndarray:
     """Return where rows are parted into so many means, or as many as there are."""
-    points = min(points, rows)
-    return np.linspace(0, rows, points + 1).astype(int)
+    return np.linspace(0, rows, min(_POINTS, rows) + 1).astype(int)
 
 
 def means_of_rows(values: np.ndarray) -> np.ndarray:

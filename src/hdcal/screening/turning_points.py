@@ -19,11 +19,15 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
     return float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * 6**0.5)
 
 
-def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
-    """Return rows at which the movement reverses by more than a threshold.
+def rows_of_runs(run: np.ndarray) -> list[np.ndarray]:
+    """Return the rows of each run, given the index of each row's, shape (n,)."""
+    order = np.argsort(run, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(run[order])) + 1)
+    return parts if order.size else []
 
-    And the sign of the first movement, 0 where x never moves by the threshold.
-    """
+
+def turning_points(x: np.ndarray, threshold: float) -> tuple[np.ndarray, int]:
+    """Return rows at which x reverses by a threshold, and the first sign, or 0."""
     # Only rows where the difference changes sign can be reversals, so the loop,
     # which has to be sequential, sees those alone.
     rows = np.flatnonzero(np.diff(x, prepend=np.nan) != 0)
@@ -62,11 +66,7 @@ def resting(rising: np.ndarray, tolerance: float) -> np.ndarray:
 
     A level is a hold where four times the tolerance contains hardly more rows than the
     tolerance itself: on a ramp it contains four times as many, at the smooth top of a
-    sine twice as many.
-
-    Args:
-        rising: monotone envelope of the movement [mm], shape (n,).
-        tolerance: spread of the readings inside a hold [mm].
+    sine twice as many. `rising` is the monotone envelope.
     """
     near = _rows_within(rising, tolerance / 2)
     return (near >= 2) & (_rows_within(rising, 2 * tolerance) < 1.5 * near)

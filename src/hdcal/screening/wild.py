@@ -17,22 +17,18 @@ from hdcal.screening.result import stretches
 
 # A reading is wild from this many times the steps between the rows about it.
 _STEPS = 2.0
-# It is this many sd from the sequence of its channel.
-_LEAVES = 8.0
-# More wild readings in a row are no reading errors.
-_LONGEST = 3
+_LEAVES = 8.0  # it is this many sd from the sequence of its channel
+_LONGEST = 3  # more wild readings in a row are no reading errors
 # Before and after them the curve is the same, but for this share of their distance.
 _GAP = 0.25
-# Fewer rows tell nothing of what is usual.
-FEWEST = 12
+FEWEST = 12  # fewer rows tell nothing of what is usual
 
 
 def wild_readings(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return rows that are wild, and their distance from the curve.
 
-    Each row is compared with a robust line through its neighbours, so that several
-    wild ones cannot hide each other. It has to be unusual on the curve of force over
-    deformation, and in the sequence of one of the two channels.
+    Each row is compared with a robust line through its neighbours, so that several wild
+    ones cannot hide each other: on the curve, and in the sequence of one channel.
     """
     if x.size < FEWEST:
         return np.array([], int), np.array([])
@@ -70,7 +66,6 @@ def _comes_back(
 
 
 def _leaves(order: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Tell which rows leave the sequence of one channel."""
     off = residuals(order, values, rows)
     usual = Usual.of(off, resolution(values))
     return np.nan_to_num(np.abs(off)) > _LEAVES * usual.scale

@@ -7,8 +7,7 @@ import numpy as np
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Kind, Observation
 
-# Stretches of rows that one sentence names.
-_LISTED = 4
+_LISTED = 4  # stretches of rows that one sentence names
 _ZERO = "the rows from there on are moved back by it, as a run with another zero"
 _CUT = "{count} left out ({rows}): "
 _SENTENCES: dict[Kind, str] = {
@@ -44,7 +43,7 @@ _CHOOSE = (
     "Check which columns are {load} and {displacement}, and their signs; or choose the "
     "part that is meant by `range`"
 )
-_HIDDEN = (
+HIDDEN = (
     "the scatter of the {displacement} hides the direction of its movement: loading "
     "and unloading cannot be distinguished"
 )
@@ -66,11 +65,6 @@ def question(
     return _sentence(found, labels, units), units.say(_CHOOSE)
 
 
-def hidden_direction(units: Quantities) -> str:
-    """Return that loading and unloading cannot be distinguished."""
-    return units.say(_HIDDEN)
-
-
 def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
     text = units.say(_SENTENCES[found.kind])
     facts = {
@@ -86,7 +80,6 @@ def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
 
 
 def _rows(found: Observation, labels: np.ndarray) -> str:
-    """Return the rows of a finding as their file names them."""
     each = [
         f"{labels[first]}" if first == last else f"{labels[first]}-{labels[last]}"
         for first, last in found.rows[:_LISTED]

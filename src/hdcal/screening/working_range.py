@@ -28,20 +28,13 @@ STRAIGHT = "straight"
 
 @dataclass(frozen=True)
 class WorkingRange:
-    """Ends of the working range.
-
-    Attributes:
-        low: lower end.
-        high: upper end.
-        unit: mm of the deformation as read, % of the largest force of a run, or
-            `straight` where the longest straight part sets the ends.
-        one_branch: whether rows of other branches lie between the ends, and are cut.
-    """
+    """Ends of the working range."""
 
     low: float
     high: float
+    # Of the deformation as read, the largest force of a run, or the straight part.
     unit: Literal["mm", "%", "straight"]
-    one_branch: bool = False
+    one_branch: bool = False  # rows of other branches between the ends are cut
 
     def words(self, units: Quantities) -> str:
         """Return the range in words."""
@@ -63,11 +56,7 @@ class WorkingRange:
 
 
 def read_range(text: str) -> WorkingRange:
-    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force, `straight` or `all`.
-
-    Raises:
-        ValueError: it is neither; the words say why.
-    """
+    """Read LOW:HIGH in mm or %, `straight` or `all`; or raise ValueError with words."""
     if text.strip() in ("all", STRAIGHT):
         unit = "mm" if text.strip() == "all" else STRAIGHT
         return WorkingRange(-math.inf, math.inf, unit)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.data.full_scale import scale_of
 from hdcal.data.gear import at_full_scale
 from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.measurements.folder import read_gear_folder
 from hdcal.data.measurements.gear_files import gear_files
+from hdcal.data.prior import scale_of
 from hdcal.data.reading import read_case
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError, quoted

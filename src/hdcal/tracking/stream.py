@@ -11,7 +11,7 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import CellError, read_number
 from hdcal.data.tables.columns import choose_columns, in_place_of_force
 from hdcal.data.tables.grid import split_line
-from hdcal.data.tables.shapes import table_of
+from hdcal.data.tables.sources import table_of
 from hdcal.data.tables.text import text_grid
 from hdcal.errors import InputError
 from hdcal.quantities import Quantities

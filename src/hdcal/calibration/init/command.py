@@ -58,7 +58,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
     """Write FOLDER with a gear file, from options or answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
-    from hdcal.data.gear_file.gear_text import gear_text
+    from hdcal.data.gear_file.toml_file import gear_text
     from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME
     from hdcal.data.reading import read_case
     from hdcal.data.tables.sources import text_of
@@ -84,7 +84,8 @@ def init(console: Console, folder, data, columns, sheet, **given):
         key: tables.pop(key) for key in ("deformation", "reference_temperature_C")
     }
     columns = columns or {} if case is None else case.columns
-    files = {GEAR_NAME: gear_text(tables, measured, columns).encode()}
+    text = gear_text({"gear": tables, "measurement": measured, "columns": columns})
+    files = {GEAR_NAME: text.encode()}
     if data is not None:
         files[DATA_NAME] = text_of(Path(data), sheet)
     _write(Path(folder), files)

@@ -1,9 +1,8 @@
 """Calibration certificates of the rig's gauges: what they state, and as priors.
 
-A gain is an error in proportion to the reading, a zero one that all readings share.
-Neither averages out over rows, and no row shows it. The zero of a force gauge is the
-zero of the force. The zero of the deformation is where the rig touches the gear: to
-the error of finding that point a displacement gauge adds its own.
+A gain is an error in proportion to the reading, a zero one that all readings share:
+no row shows them. The zero of the deformation is where the rig touches the gear: to the
+error of finding that point a displacement gauge adds its own.
 """
 
 import math
@@ -27,15 +26,10 @@ _Percent = Annotated[float, within("expanded_percent")]
 
 
 class GaugeCertificate(BaseModel):
-    """What every certificate may state.
-
-    Attributes:
-        SITES: the site of the model of each key.
-        k: coverage factor.
-    """
+    """What every certificate may state: k is the coverage factor."""
 
     model_config = STRICT
-    SITES: ClassVar[dict[str, str]]
+    SITES: ClassVar[dict[str, str]]  # site of the model of each key
     k: Annotated[float, within("k")] | None = None
 
     @property
@@ -46,8 +40,8 @@ class GaugeCertificate(BaseModel):
     @model_validator(mode="after")
     def _states_something(self) -> Self:
         if not self.stated:
-            keys = ", ".join(self.SITES)
-            raise fault("states no uncertainty", f"Write one of {keys}")
+            remedy = f"Write one of {', '.join(self.SITES)}"
+            raise fault("states no uncertainty", remedy)
         return self
 
 
@@ -85,9 +79,9 @@ def is_stated(prior: Prior) -> bool:
 def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior]:
     """Return the priors that certificates state, by site, in code units."""
     priors = {}
-    for one in given.values():
-        for key, value in one.stated.items():
-            site, k = one.SITES[key], one.k or _K
+    for certificate in given.values():
+        for key, value in certificate.stated.items():
+            site, k = certificate.SITES[key], certificate.k or _K
             sd = value / k * (0.01 if _UNITS[site] == "1" else 1.0)
             source = f"{_SOURCE}{key} = {value}, k = {k:g}"
             priors[site] = Prior("normal", (0.0, sd), _UNITS[site], source)

@@ -7,14 +7,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel
 
-from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear_file.validation import STRICT, within
-from hdcal.data.prior import Prior
+from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.priors import effect_priors, rig_priors
-from hdcal.screening.turning_points import TURN_MOST, turning_points
+from hdcal.screening.turning_points import TURN_MOST, rows_of_runs, turning_points
 
-# Of a pitch by its drawing.
-_PITCH_LOG_SD = 0.02
+_PITCH_LOG_SD = 0.02  # of a pitch by its drawing
 # Noise is what is faster than the loading: readings err alike over a fifth of a half
 # cycle at most, so that each holds five independent stretches. Slower is a bend.
 _FAST = 0.2
@@ -68,12 +66,7 @@ def correlation_prior(
 
     White noise behind a filter of first order is correlated by e^(−2π f Δt). Where
     that is little nothing is known: other causes may correlate errors for longer.
-
-    Args:
-        cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
-        deformation: in the order it was taken [mm], shape (n,).
-        run: index of the mounting, shape (n,).
-        time: time of the readings [s], shape (n,); None where it was not measured.
+    The cutoff f [Hz] is that of the rig's low-pass filter; time [s], shape (n,).
     """
     steps = np.diff(time) if cutoff is not None and time is not None else np.array([])
     if cutoff is not None and np.any(steps > 0.0):
@@ -89,10 +82,8 @@ def correlation_prior(
 def rows_of_half_cycle(deformation: np.ndarray, run: np.ndarray) -> float:
     """Return the median number of rows between two turns of the loading."""
     lengths: list[int] = []
-    order = np.argsort(run, kind="stable")
-    cuts = np.flatnonzero(np.diff(run[order])) + 1
-    for own in np.split(deformation[order], cuts):
-        span = float(np.ptp(own))
-        turns = turning_points(own, TURN_MOST * span)[0] if span > 0.0 else ()
-        lengths += np.diff([0, *turns, len(own)]).tolist()
+    for rows in rows_of_runs(run):
+        x, span = deformation[rows], float(np.ptp(deformation[rows]))
+        turns = turning_points(x, TURN_MOST * span)[0] if span > 0.0 else ()
+        lengths += np.diff([0, *turns, len(x)]).tolist()
     return float(np.median(lengths))

@@ -77,13 +77,7 @@ class GearFile(BaseModel):
 
 
 def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return the tables of a gear file from a mapping that may leave out their names.
-
-    A key that no table has is put into [gear], where the schema refuses it.
-
-    Raises:
-        InputError: a key is stated twice.
-    """
+    """Return the tables of a gear file from a mapping, with or without their names."""
     plain = {
         str(key): dict(value) if isinstance(value, Mapping) else value
         for key, value in source.items()
@@ -106,21 +100,17 @@ def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
     return MeasurementTable.model_validate(table.get("measurement", {})).certificates
 
 
-def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
-    """Return sizes that are missing, and relations between those that are there.
-
-    Checked whatever else is wrong.
-    """
+def size_findings(toml: TomlFile) -> list[Finding]:
+    """Return sizes that are missing, and relations between those that are there."""
     table = toml.table.get("gear")
     if not isinstance(table, dict):
         return []
-    missing = [name for name in SIZES_NEEDED if name not in table]
+    needed = () if table.get("theory") == SPRING else SIZES_NEEDED
     other = f"; or take the theory '{SPRING}', which needs none"
-    if (theory or table.get("theory")) == SPRING:
-        missing = []
     findings = [
         toml.finding("is missing", f"Add it: {name} = …{other}", f"gear.{name}")
-        for name in missing
+        for name in needed
+        if name not in table
     ]
     numbers = {
         name.removesuffix("_mm"): value

@@ -1,27 +1,24 @@
-"""A TOML file, with findings on its keys."""
+"""Read TOML files, with findings on their keys, and write gear files."""
 
+import json
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from hdcal.data.regular_file import why_not_readable
+from hdcal.data.findings import FileFindings, why_not_readable
 from hdcal.errors import Finding, InputError
 
 _LARGEST = 1 << 20
+_NAME = 200  # letters of a gear's name, as the schema takes them
 _PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
 
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A parsed TOML file.
-
-    Attributes:
-        file: its name, as the user gave it.
-        table: its content.
-    """
+    """A parsed TOML file, and its name as the user gave it."""
 
     file: str
     table: dict
@@ -36,29 +33,22 @@ class TomlFile:
 
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
-    """Read and parse a TOML file.
-
-    Raises:
-        InputError: missing, unreadable, too large, or not TOML.
-    """
-
-    def refusal(problem: str, remedy: str, row: int | None = None) -> InputError:
-        return InputError([Finding(file, problem, remedy, row)])
-
+    """Read a TOML file; raise InputError where it is none."""
+    findings = FileFindings(file)
     if isinstance(source, Path) and (why := why_not_readable(source, _LARGEST)):
-        raise refusal(*why)
+        findings.refuse(*why)
     try:
         raw = source.read_bytes()
     except FileNotFoundError:
-        raise refusal("does not exist", "Check the name") from None
+        findings.refuse("does not exist", "Check the name")
     except (OSError, ValueError) as error:
         words = f"cannot be read ({getattr(error, 'strerror', None) or error})"
-        raise refusal(words, "Check name and permissions") from None
+        findings.refuse(words, "Check name and permissions")
     try:
         table = tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         row = raw.count(b"\n", 0, error.start) + 1
-        raise refusal("is not UTF-8 text", "Save it as UTF-8", row) from None
+        findings.refuse("is not UTF-8 text", "Save it as UTF-8", row)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         # RecursionError: thousands of nested brackets
         nested = isinstance(error, RecursionError)
@@ -66,13 +56,20 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         place = _PLACE.search(message)
         words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
-        raise refusal(words, "Correct that line", row) from None
+        findings.refuse(words, "Correct that line", row)
     return TomlFile(file, table)
 
 
-def did_you_mean(name: str, known: list[str]) -> str:
-    """Return a remedy with the likeliest meaning of an unknown name, and all known."""
-    by_lower = {item.lower(): item for item in known}
-    near = get_close_matches(name.lower(), by_lower, 1, 0.5)
-    hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
-    return f"{hint}Known are: {', '.join(known)}"
+def gear_text(tables: Mapping[str, Mapping[str, str | float]]) -> str:
+    """Return the text of a gear file of these tables."""
+    lines = []
+    for table, rows in tables.items():
+        lines += [f"[{table}]"] if rows else []
+        for key, value in rows.items():
+            if key == "name":
+                # Of a file, whose name may hold anything.
+                value = "".join(c for c in str(value) if c.isprintable())[:_NAME]
+            # A text in TOML's quotes is written as in JSON.
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+        lines += [""] if rows else []
+    return "\n".join(lines)

@@ -6,7 +6,8 @@ from typing import Any, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
-from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean
+from hdcal.data.findings import did_you_mean
+from hdcal.data.gear_file.toml_file import TomlFile
 from hdcal.data.plausible import out_of_range, range_of
 from hdcal.errors import Finding, InputError
 
@@ -46,11 +47,7 @@ def within(quantity: str) -> AfterValidator:
 def checked(
     kind: type[M], data: Any, toml: TomlFile, key: str = "", context: Any = None
 ) -> M:
-    """Return the table at a dotted key of a file as a model of pydantic.
-
-    Raises:
-        InputError: holds everything that is wrong with the data.
-    """
+    """Return the table at a dotted key of a file as a model, or raise InputError."""
     try:
         return kind.model_validate(data, context=context)
     except ValidationError as error:
@@ -61,11 +58,7 @@ def checked(
 
 
 def requested(kind: type[M], context: Any, **given: Any) -> M:
-    """Return the request that parameters make.
-
-    Raises:
-        InputError: holds everything that is wrong with them.
-    """
+    """Return the request that parameters make, or raise InputError."""
     try:
         return kind.model_validate(given, context=context)
     except ValidationError as error:
@@ -77,10 +70,9 @@ def requested(kind: type[M], context: Any, **given: Any) -> M:
 def _faults(
     error: ValidationError, kind: type[BaseModel]
 ) -> Iterator[tuple[list[str], str, str]]:
-    """Yield place, problem and remedy of each error."""
-    for one in error.errors():
-        place = [str(part) for part in one["loc"]]
-        yield place, *_words(dict(one), place, kind)
+    for details in error.errors():
+        place = [str(part) for part in details["loc"]]
+        yield place, *_words(dict(details), place, kind)
 
 
 def _words(error: dict, place: list[str], model: Any) -> tuple[str, str]:
@@ -100,8 +92,7 @@ def _words(error: dict, place: list[str], model: Any) -> tuple[str, str]:
             return "is missing", f"Add it: {example}"
         case "literal_error":
             known = error["ctx"]["expected"].replace(" or ", ", ").split(", ")
-            remedy = did_you_mean(
-                str(error["input"]), [one.strip("'") for one in known]
-            )
+            names = [name.strip("'") for name in known]
+            remedy = did_you_mean(str(error["input"]), names)
             return f"unknown choice '{error['input']}'", remedy
     return error["msg"][:1].lower() + error["msg"][1:], f"Write it like {example}"

@@ -29,7 +29,8 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     """Return that bad gears can be left out; `many` counts all, where it is known."""
-    words = f"{len(bad)} of {many or 'the'} gears {_be(bad)} bad: "
+    verb = "is" if len(bad) == 1 else "are"
+    words = f"{len(bad)} of {many or 'the'} gears {verb} bad: "
     words += shortened([*map(quoted, bad)], _LISTED)
     remedy = "Set it to leave these gears out as a whole and evaluate the others"
     return Finding("skip_bad", words, remedy)
@@ -38,7 +39,8 @@ def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
 def left_out_words(left_out: Mapping[str, Finding], many: int) -> str:
     """Return which gears of many are left out, and why."""
     each = [f"{gear} ({cause(why)})" for gear, why in left_out.items()]
-    words = f"{len(left_out)} of {many} gears {_be(left_out)} left out"
+    verb = "is" if len(left_out) == 1 else "are"
+    words = f"{len(left_out)} of {many} gears {verb} left out"
     return f"{words}: {shortened(each, _LISTED)}."
 
 
@@ -46,7 +48,3 @@ def cause(finding: Finding) -> str:
     """Return the fault of a gear, with its place where that is a row."""
     place = "" if finding.row is None else f"{finding.where}: "
     return f"{place}{finding.problem}"
-
-
-def _be(gears: Mapping[str, Finding]) -> str:
-    return "is" if len(gears) == 1 else "are"

@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.full_scale import scale_of
 from hdcal.data.gear import at_full_scale
 from hdcal.data.gear_file.rig_facts import correlation_prior
-from hdcal.data.loading import Motion, derive_motion
+from hdcal.data.loading import Motion, derive_motion, sense_at_turns
 from hdcal.data.measurements.labels import further_labels
 from hdcal.data.measurements.measurements import Measurements
 from hdcal.data.measurements.notes import (
@@ -18,13 +17,12 @@ from hdcal.data.measurements.notes import (
     mountings_note,
     resets_note,
     rigs_note,
-    temperature_note,
 )
 from hdcal.data.measurements.screened import asked_range, screened, screening_notes
+from hdcal.data.prior import scale_of
 from hdcal.data.priors import rig_priors
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
-from hdcal.data.turning_rows import sense_at_turns
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import TORQUE
 from hdcal.screening.result import Screening
@@ -43,14 +41,10 @@ def case_of(
     range: str | None = None,
     skip_bad: bool | None = None,
 ) -> Case:
-    """Return what was measured on a gear, or several of its kind, as a case.
-
-    Raises:
-        InputError: as `screened`.
-    """
+    """Return what was measured on a gear, or several of its kind, as a case."""
     wanted = asked_range(range or gear.source.get("measurement", {}).get("range"))
-    before = gear_notes(gear, measured["force"])
-    notes = [*notes, *before, *temperature_note(measured.get("temperature"))]
+    before = gear_notes(gear, measured["force"], measured.get("temperature"))
+    notes = [*notes, *before]
     measured, screening = screened(measured, wanted, skip_bad)
     return screened_case(measured, screening, gear, notes, name)
 
@@ -66,7 +60,10 @@ def screened_case(
     if measured.units == TORQUE:
         _require_torsion(gear, name)
     (specimen, gears), (run, runs) = measured.gears, measured.runs
-    motion = _motion(measured, run, screening)
+    hidden, x = screening is not None and screening.trembling, measured["deformation"]
+    motion = derive_motion(x, run, measured.get("time"), hidden=hidden)
+    sense = sense_at_turns(motion.sense, x, measured["force"], run)
+    motion = replace(motion, sense=sense)
     further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
     mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
     every = [
@@ -125,16 +122,6 @@ def _require_torsion(gear: Gear, name: str) -> None:
         words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
         words += "and the readings are torques over angles"
         raise InputError([Finding(name, words, "Leave these entries out")])
-
-
-def _motion(
-    measured: Measurements, run: np.ndarray, screening: Screening | None
-) -> Motion:
-    hidden = screening is not None and screening.trembling
-    x = measured["deformation"]
-    motion = derive_motion(x, run, measured.get("time"), hidden=hidden)
-    sense = sense_at_turns(motion.sense, x, measured["force"], run)
-    return replace(motion, sense=sense)
 
 
 def _records(

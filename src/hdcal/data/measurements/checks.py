@@ -13,8 +13,7 @@ from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import DIMENSIONS
 
 FEWEST_ROWS = 5
-# Kelvin become degrees Celsius with an error of rounding.
-_ROUNDED = 1e-9
+_ROUNDED = 1e-9  # kelvin become degrees Celsius with an error of rounding
 
 
 def check_whole(

@@ -1,6 +1,8 @@
 """A folder with a file, or a folder, for each gear."""
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +18,9 @@ from hdcal.data.measurements.gear_files import (
     gear_labels,
     not_read,
 )
-from hdcal.data.measurements.joining import joined, labelled
 from hdcal.data.measurements.measurements import Measurements, read_measurements
 from hdcal.data.reading import asked_columns, gear_of
+from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
@@ -36,31 +38,18 @@ def read_gear_folder(
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
     columns: Mapping[str, str] | None = None,
-    theory: str | None = None,
     encoding: str | None = None,
     skip_bad: bool | None = None,
     range: str | None = None,
 ) -> tuple[Case, dict[str, list] | None]:
-    """Read a folder with a file for each gear, or with a folder for each.
+    """Read a folder with a file, or a folder, for each gear; arguments as `read_case`.
 
     Where a file names no gears, all of its rows are of the one that it, or its folder,
-    is called after. A file that cannot be read is a bad gear.
-
-    Args:
-        data: a folder for which `gear_files` returns some.
-        gear: as in `read_case`; by default the gear.toml in the folder, or that of the
-            first gear. Others may differ from it in their sizes.
-        columns: as in `read_case`, and so are all that follow.
-        theory: overrides the gear file's.
-        encoding: encoding of the files.
-        skip_bad: whether bad gears are left out.
-        range: working range.
-
-    Raises:
-        InputError: holds everything that is wrong with any file.
+    is called after. A file that cannot be read is a bad gear. The gear is by default
+    the gear.toml in the folder, or that of the first gear; others differ in sizes.
 
     Returns:
-        The case, and a table of the sizes of each gear where they have files.
+        The case, and a table of the sizes of each gear where they have gear files.
     """
     named, _ = asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
@@ -75,11 +64,11 @@ def read_gear_folder(
     parts: list[_Part] = []
     unread: dict[str, Findings] = {}
     with Findings() as wrong:
-        described = wrong.attempt(gear_of, gear, nearby, False, theory)
+        described = wrong.attempt(gear_of, gear, nearby, False)
         common, notes = described or (None, ())
         for place, (file, label) in enumerate(zip(files, labels, strict=True)):
             each = Findings()
-            its = each.attempt(read_gear, own[place], theory) if own else None
+            its = each.attempt(read_gear, own[place]) if own else None
             if its is not None and common is not None:
                 each += _differences(its, common, own[place], base)
             here = its or common
@@ -94,7 +83,11 @@ def read_gear_folder(
                 parts.append((labelled(measured, label), its))
         wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert common is not None
-    bad = {label: _why(each[0], folder) for label, each in unread.items()}
+    bad = {label: each[0] for label, each in unread.items()}
+    for label, why in bad.items():
+        if why.row is None:
+            words = f"{why.where}: {why.problem}"
+            bad[label] = Finding(str(folder), words, why.remedy)
     whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
     about = [f"each {kind} is a gear of that name, unless it has a column of gears"]
@@ -107,7 +100,7 @@ def read_gear_folder(
 
 
 def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
-    """Yield a finding where a file holds torques and the first one forces, or not."""
+    """Yield a finding where one file holds torques and the other one forces."""
     if one.units != first.units:
         words = f"holds {one.units.load}s, and {first.file} {first.units.load}s"
         yield Finding(one.file, words, "Keep files of one kind in a folder")
@@ -116,10 +109,8 @@ def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
 def _unread(
     parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool | None
 ) -> list[Finding]:
-    """Return findings on files that cannot be read, unless they may be left out.
-
-    Where others name gears themselves nobody knows which gears such a file holds.
-    """
+    """Return findings on files that cannot be read, unless they may be left out."""
+    # Where others name gears themselves nobody knows which gears such a file holds.
     known = bool(parts) and not any("specimen" in part.stated for part, _ in parts)
     if skip_bad and known:
         return []
@@ -128,13 +119,6 @@ def _unread(
         bad = {label: each[0] for label, each in unread.items()}
         findings.append(offer(bad, len(parts) + len(bad)))
     return findings
-
-
-def _why(first: Finding, folder: Path) -> Finding:
-    """Return why a gear is left out, with the file in the words where no row is."""
-    if first.row is not None:
-        return first
-    return Finding(str(folder), f"{first.where}: {first.problem}", first.remedy)
 
 
 def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
@@ -171,7 +155,44 @@ def _sizes(parts: Sequence[_Part]) -> dict[str, list]:
 
 def _stated_by_some(stated: Sequence[frozenset[str]]) -> Iterator[str]:
     """Yield a note on each quantity that some files state and others do not."""
-    each = [one - {"specimen", "temperature", "run", *GROUPINGS} for one in stated]
+    each = [names - {"specimen", "temperature", "run", *GROUPINGS} for names in stated]
     for name in sorted(frozenset().union(*each) - each[0].intersection(*each)):
-        many = sum(name in one for one in each)
+        many = sum(name in names for names in each)
         yield f"{name} is not read: {many} of {len(each)} files state it"
+
+
+def labelled(measured: Measurements, label: str) -> Measurements:
+    """Return measurements with the gear of each row, and the file in its row's name."""
+    frame = measured.frame.set_axis([f"{row} of {label}" for row in measured.rows])
+    if "specimen" not in measured.stated:
+        frame = frame.assign(specimen=label)
+    else:  # a gear of two files was mounted for each of them
+        runs = frame["run"].cat.rename_categories(lambda run: f"{label} {run}".strip())
+        frame = frame.assign(run=runs)
+    return replace(measured, frame=frame)
+
+
+def joined(
+    parts: Sequence[Measurements], warm: float, bad: Mapping[str, Finding]
+) -> Measurements:
+    """Return the rows of all parts below each other."""
+    blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
+    frames = [part.frame for part in parts]
+    names = dict.fromkeys(name for frame in frames for name in frame)
+    kept = [n for n in names if n in blank or all(n in frame for frame in frames)]
+    frames = [
+        frame.assign(**{n: blank[n] for n in kept if n not in frame})[kept]
+        for frame in frames
+    ]
+    labels = dict.fromkeys(("specimen", "run"), str)
+    whole: Any = pd.concat([frame.astype(labels) for frame in frames])
+    left_out = {gear: why for part in parts for gear, why in part.left_out.items()}
+    hashes = "".join(part.sha256 for part in parts)
+    return replace(
+        parts[0],
+        frame=whole.astype(dict.fromkeys(labels, "category")),
+        sha256=hashlib.sha256(hashes.encode()).hexdigest(),
+        stated=frozenset().union(*(part.stated for part in parts)),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        left_out={**bad, **left_out},
+    )

@@ -31,11 +31,7 @@ def gear_files(data: Any) -> list[Path]:
 
 
 def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
-    """Return the names of the gears, and whether each has a folder.
-
-    Raises:
-        InputError: some have one and some not, or two have the same name.
-    """
+    """Return the names of the gears, and whether each has a folder; or InputError."""
     cases = [file for file in files if file.parent != folder]
     if cases and len(cases) < len(files):
         words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
@@ -51,11 +47,7 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
 
 
 def file_of_gear(data: Path, label: str | None) -> Path:
-    """Return the file of a gear in a folder that has one for each; else the data.
-
-    Raises:
-        InputError: it is such a folder, and none of its gears is called so.
-    """
+    """Return the file of a gear in a folder that has one for each; else the data."""
     files = gear_files(data)
     if not files:
         return data

@@ -9,8 +9,7 @@ import pandas as pd
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
-# What is the same all through a mounting.
-TELLING = ("date", "rig", "operator")
+TELLING = ("date", "rig", "operator")  # what is the same all through a mounting
 # The day of a time stamp in any form; a date in ISO 8601, alone or with a time.
 _DAY = r"^(\d+[-./]\d+[-./]\d+)"
 _ISO = r"^\d{4}-\d\d-\d\d(?:[T ]|$)"
@@ -43,11 +42,7 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
 
     Without a column `run`, rows of a gear on another day or rig, or by another
     operator, are of another mounting. An empty cell is that of the row of the same gear
-    above it, or else below it.
-
-    Args:
-        values: by quantity, of each row, shape (n,).
-        gear: index of each row's, shape (n,).
+    above it, or else below it. Values by quantity and index of the gear, shape (n,).
     """
     stated = {name: np.asarray(values[name]) for name in TELLING if name in values}
     if not stated:
@@ -73,27 +68,22 @@ def further_labels(
     run: np.ndarray,
     runs: tuple[str, ...],
 ) -> tuple[dict[str, tuple[str, ...]], list[str]]:
-    """Return lots of gears, operators, rigs and dates of runs, as `Case` has them.
-
-    Returns:
-        The labels, and notes on those that are not used.
-    """
+    """Return lots, operators, rigs and dates for `Case`, and notes on unused ones."""
     each = {
         "lots": _one_each(frame, "lot", gear, gears),
         "operators": _one_each(frame, "operator", run, runs),
         "rigs": _one_each(frame, "rig", run, runs),
         "dates": _dates(frame, run),
     }
-    labels = {name: one for name, (one, _) in each.items()}
+    labels = {name: texts for name, (texts, _) in each.items()}
     return labels, [note for _, note in each.values() if note]
 
 
 def _one_each(
     frame: pd.DataFrame, quantity: str, index: np.ndarray, names: tuple[str, ...]
 ) -> tuple[tuple[str, ...], str]:
-    """Return the one label of each gear or run, and a note.
+    """Return the label of each gear or run; none and a note where one has several.
 
-    There are none where the file states none, or one has several, which the note says.
     An empty cell is filled by the others of its gear or mounting.
     """
     if quantity not in frame:
@@ -106,16 +96,13 @@ def _one_each(
         name = quoted(names[each["of"][several].min()])
         return (), f"{quantity}s are not used: {word} {name} has several"
     stated = dict(zip(each["of"], each["label"], strict=True))
-    return tuple(stated.get(one, NOT_STATED) for one in range(len(names))), ""
+    return tuple(stated.get(i, NOT_STATED) for i in range(len(names))), ""
 
 
 def _dates(frame: pd.DataFrame, run: np.ndarray) -> tuple[tuple[str, ...], str]:
-    """Return the first date of each run in ISO 8601, and a note.
-
-    A run that states none has an empty one. There are none where one cannot be read.
-    """
-    texts: Any = pd.Series(frame["date"].to_numpy() if "date" in frame else []).astype(
-        str
+    """Return the first date of each run, or none and a note where one is unreadable."""
+    texts: Any = pd.Series(
+        frame["date"].astype(str).to_numpy() if "date" in frame else []
     )
     stated = texts[texts != NOT_STATED]
     if stated.empty:

@@ -34,34 +34,23 @@ from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
 from hdcal.quantities import FORCE, TORQUE, Quantities
 
-# Labels that one finding names.
-_LISTED = 20
+_LISTED = 20  # labels that one finding names
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """Readings in the order in which they were taken.
+    """Readings in the order in which they were taken, as in `Case`.
 
-    Attributes:
-        frame: columns by quantity, in code units, indexed by the row of the source.
-            There always are deformation, force, and the labels `specimen` and `run`,
-            "1" and "" where nothing is stated; `zero` counts the jumps of a zero
-            before a row.
-        file: name of the source in findings.
-        sha256: hash of the source.
-        stated: quantities that the source states.
-        named: quantity -> header with its unit, of headers that are not hdcal's own.
-        notes: assumptions.
-        left_out: gears that were left out, each with its fault.
-        units: names and units of force and deformation; of a torsional spring they
-            are a torque and an angle.
+    The frame holds columns by quantity, in code units, indexed by the row of the
+    source: always deformation, force, `specimen` and `run`, "1" and "" where nothing is
+    stated, and `zero`, the number of jumps of a zero before a row.
     """
 
     frame: pd.DataFrame
     file: str
     sha256: str = ""
-    stated: frozenset[str] = frozenset()
-    named: dict[str, str] = field(default_factory=dict)
+    stated: frozenset[str] = frozenset()  # quantities that the source states
+    named: dict[str, str] = field(default_factory=dict)  # `Case.columns`
     notes: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
     units: Quantities = FORCE
@@ -71,7 +60,7 @@ class Measurements:
         return self.frame[quantity].to_numpy()
 
     def get(self, quantity: str, default: Any = None) -> Any:
-        """Return a column, shape (n,), or the default of one that is not there."""
+        """Return a column, or the default of one that is not there."""
         return self[quantity] if quantity in self.frame else default
 
     @property
@@ -108,21 +97,7 @@ def read_measurements(
     gear: Gear | None = None,
     skip_bad: bool | None = None,
 ) -> Measurements:
-    """Read a source of measurements.
-
-    Args:
-        data: the file, or a table in memory (see `read_source`).
-        mapping: quantity -> header, the unit in brackets, as in
-            `{"force": "Load[kgf]"}`; for headers that do not name themselves.
-        encoding: encoding of a text; by default the likeliest.
-        sheet: sheet of a workbook; by default the one with readings.
-        gear: its radius bounds the deformations; None where it is unknown.
-        skip_bad: True leaves out gears with a faulty row, whole; False refuses them
-            and mentions this option.
-
-    Raises:
-        InputError: holds everything that is wrong with the source.
-    """
+    """Read a file or a table in memory; arguments are those of `read_case`."""
     name = IN_MEMORY if is_frame(data) else str(data)
     name = name if sheet is None else f"{name}, sheet {quoted(sheet)}"
     with FileFindings(name) as findings:
@@ -149,15 +124,8 @@ def measured_in(
     """Return the measurements in the columns of a table.
 
     Gears that are left out have no influence on the others: the decimal sign of cells,
-    for example, is judged by the others alone.
-
-    Args:
-        table: the readings.
-        used: columns by quantity.
-        findings: gets what is wrong with the rows that count.
-        gear: as in `read_measurements`, and so is `skip_bad`.
-        skip_bad: whether to leave out bad gears.
-        whole: whether these are all rows of the source.
+    for example, is judged by the others alone. `whole`: these are all rows of the
+    source.
     """
     left_out: dict[str, Finding] = {}
     while True:
@@ -195,10 +163,10 @@ def _measured(
         check_whole(frame, used, findings)
     check_rows(frame, used, findings)
     stated = frozenset(values)
-    one = np.zeros(len(frame), np.int8)
-    gears = values.get("specimen", pd.Categorical.from_codes(one, ["1"]))
+    codes = np.zeros(len(frame), np.int8)
+    gears = values.get("specimen", pd.Categorical.from_codes(codes, ["1"]))
     runs = values.get("run", run_labels(values, pd.factorize(gears)[0]))
-    runs = pd.Categorical.from_codes(one, [""]) if runs is None else runs
+    runs = pd.Categorical.from_codes(codes, [""]) if runs is None else runs
     frame["specimen"], frame["run"] = pd.Categorical(gears), pd.Categorical(runs)
     frame["zero"] = 0
     force = used.get("force")
@@ -214,11 +182,7 @@ def _measured(
 def _with_time(
     read: Measurements, column: Column, findings: FileFindings
 ) -> Measurements:
-    """Return measurements with a time that never goes back within a run, or without.
-
-    A time that goes back is refused where the user names it, or a header `time_UNIT`;
-    it is not used, with a note, where its header was guessed.
-    """
+    """Refuse a time that goes back within a run, or drop it where it was guessed."""
     index, names = read.runs
     back = rows_back_in_time(read["time"], index)
     if not back.any():
@@ -237,11 +201,7 @@ def _with_time(
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
-    """Return the measurements of one specimen.
-
-    Raises:
-        InputError: there is no such specimen, it has too few rows, or it was not moved.
-    """
+    """Return the measurements of one specimen, or raise InputError."""
     findings, (_, names) = FileFindings(measured.file), measured.gears
     name = quoted(label)
     if label not in names:
@@ -257,3 +217,23 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
         words = f"the {measured.units.displacement} of specimen {name} is constant"
         findings.refuse(words, "Measure at several")
     return one
+
+
+def read_force(
+    path: Any, columns: Mapping[str, str] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read time [s] and force [N], to drive a model with, shape (n,) each."""
+    needed = "time", "force"
+    with FileFindings(str(path)) as findings:
+        table, _ = read_source(path, findings)
+        used = choose_columns(table, columns or {}, needed, needed, findings)
+        values, _ = read_values(table, used, findings)
+        frame = pd.DataFrame(values, index=table.rows)
+        check_whole(frame, used, findings, fewest=2)
+        check_rows(frame, used, findings)
+        if "time" in frame:
+            words = "the time is not later than that of the row before"
+            remedy = "Write a jump of the force as two rows a little apart"
+            back = frame.index[1:][np.diff(frame["time"]) <= 0.0].tolist()
+            findings.add_rows(((row, words, remedy) for row in back), "time")
+    return frame["time"].to_numpy(), frame["force"].to_numpy()

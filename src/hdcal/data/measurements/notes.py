@@ -14,8 +14,7 @@ from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted, shortened
 from hdcal.quantities import Quantities
 
-# First word of a note on what was assumed.
-ASSUMED = "ASSUMED: "
+ASSUMED = "ASSUMED: "  # first word of a note on what was assumed
 _MOST_ROWS = 8  # listed in one note
 _USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
 _THIN = 0.1  # largest wall over radius that textbooks call a thin-walled cylinder
@@ -51,8 +50,10 @@ def _meaning(column: Column) -> str:
     return f"{quoted(column.header)} is the {column.quantity}{unit}"
 
 
-def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
-    """Yield what is unusual of a gear file, or at odds with forces [N], shape (n,)."""
+def gear_notes(
+    gear: Gear, force: np.ndarray, temperature: np.ndarray | None
+) -> Iterator[str]:
+    """Yield what is unusual of a gear, its forces [N] and temperatures [°C], (n,)."""
     size, step = gear.geometry, gear.force_resolution
     if gear.theory != SPRING and float(size.wall_thickness / size.radius) > _THIN:
         yield (
@@ -63,10 +64,6 @@ def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
         off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
         if off:
             yield f"{off} of {force.size} forces are not multiples of {step:g} N"
-
-
-def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
-    """Yield that temperatures [°C], shape (n,), are those of no rig."""
     low, high = _USUAL
     if temperature is not None and not low <= np.median(temperature) <= high:
         yield (

@@ -32,8 +32,7 @@ from hdcal.data.tables.parquet_files import (
     parquet_table,
     plain_columns,
 )
-from hdcal.data.tables.shapes import table_of
-from hdcal.data.tables.sources import file_sha256
+from hdcal.data.tables.sources import file_sha256, table_of
 
 if TYPE_CHECKING:
     from pyarrow import Schema, Table
@@ -47,24 +46,12 @@ _USED += GROUPINGS
 
 @dataclass(frozen=True)
 class Parquet:
-    """Files that are read in batches.
-
-    Attributes:
-        name: name of the file or folder.
-        gear: the gear file's, common to all gears.
-        files: in their order.
-        root: their folder; empty where there is one file.
-        schema: columns of all files.
-        used: columns by quantity.
-        named: as in `Measurements`.
-        notes: what was assumed.
-        range: working range; None of all rows.
-    """
+    """Files that are read in batches, with the columns and the gear of all of them."""
 
     name: str
     gear: Gear
     files: Sequence[str]
-    root: str
+    root: str  # folder of the files; empty where there is one file
     schema: "Schema"
     used: Mapping[str, Column]
     named: dict[str, str]
@@ -84,14 +71,9 @@ def open_parquet(
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
     columns: Mapping[str, str] | None = None,
-    theory: str | None = None,
     range: str | None = None,
 ) -> Parquet:
-    """Look into a Parquet file, or a folder of them, partitioned or not.
-
-    Raises:
-        InputError: holds everything that is wrong with its columns.
-    """
+    """Look into a Parquet file, or a folder of them, partitioned or not."""
     path = Path(data)
     files = parquet_files(path)
     root = str(path) if path.is_dir() else ""
@@ -99,7 +81,7 @@ def open_parquet(
     asked_range(range)
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        common, notes = gear_of(gear, nearby, False, theory)
+        common, notes = gear_of(gear, nearby, False)
         named = {**common.source.get("columns", {}), **(columns or {})}
         first = dataset.head(_SHOWN, columns=plain_columns(dataset.schema))
         table = table_of(frame_grid(frame_of(first)), findings)
@@ -124,18 +106,14 @@ def open_parquet(
 def read_batches(
     source: Parquet, file: str, *, skip_bad: bool | None = None
 ) -> Iterator[Measurements]:
-    """Yield the rows of one file of a source, in their order, not screened.
-
-    Raises:
-        InputError: holds the faults of the first batch that has some.
-    """
+    """Yield the rows of one file of a source, in their order, not screened."""
     with FileFindings(file) as findings:
         dataset = parquet_table([file], source.root, findings)
     dataset = dataset.replace_schema(source.schema)
     names = plain_columns(source.schema)
     headers = [names[column.position] for column in source.used.values()]
     places = {q: place for place, q in enumerate(source.used)}
-    used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
+    used = {q: replace(column, position=places[q]) for q, column in source.used.items()}
     for first, rows in _whole_gears(dataset, headers, places["specimen"]):
         with FileFindings(file) as findings:
             frame = frame_of(rows)
@@ -153,10 +131,7 @@ def read_batches(
 def _whole_gears(
     dataset: "Dataset", headers: list[str], specimen: int
 ) -> Iterator[tuple[int, "Table"]]:
-    """Yield rows that end with those of a gear, and the number of the first.
-
-    The labels of gears stand in the column at the place `specimen`.
-    """
+    """Yield rows that end with those of a gear, and the number of the first."""
     import pyarrow
 
     held, first = None, 1

@@ -14,7 +14,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
-from hdcal.screening.words import hidden_direction, in_words, question
+from hdcal.screening.words import HIDDEN, in_words, question
 from hdcal.screening.working_range import (
     FORM,
     STRAIGHT,
@@ -23,16 +23,11 @@ from hdcal.screening.working_range import (
     read_range,
 )
 
-# Findings of a record that are listed.
-_LISTED = 50
+_LISTED = 50  # findings of a record that are listed
 
 
 def asked_range(wanted: str | None) -> WorkingRange | None:
-    """Read a working range.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Read a working range, or raise InputError."""
     if wanted is None:
         return None
     try:
@@ -50,11 +45,7 @@ def screened(
 ) -> tuple[Measurements, Screening]:
     """Return the rows of a record that are a curve of the part, and its screening.
 
-    Args:
-        measured: as read.
-        wanted: working range; by default all of it.
-        skip_bad: as in `read_case`.
-        whole: whether these are all rows of the source.
+    `whole`: these are all rows of the source.
 
     Raises:
         InputError: holds what only the user can decide about; or hardly a row is left.
@@ -67,19 +58,16 @@ def screened(
         return screened(left, wanted, whole=whole)
     if wanted is not None:
         if wanted.unit == STRAIGHT and result.straight is None:
-            words = (
-                "is straight, and the data are of several runs, or of cycles without "
-            )
-            words += "straight movements"
+            words = "is straight, and the data are of several runs, or of cycles "
+            words += "without straight movements"
             raise InputError([Finding("range", words, FORM)])
         result = in_range(result, wanted, run, units)
-    reach, each = result.working_range, result.observations
-    gears = measured["specimen"]
-    words = tuple(
-        replace(in_words(one, rows, reach, units), gear=str(gears[one.rows[0][0]]))
-        for one in each
+    reach, gears = result.working_range, measured["specimen"]
+    found = tuple(
+        replace(in_words(o, rows, reach, units), gear=str(gears[o.rows[0][0]]))
+        for o in result.observations
     )
-    result = replace(result, observations=words)
+    result = replace(result, observations=found)
     kept = int(result.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):
         problem = f"{kept} of {run.size} rows are left"
@@ -99,10 +87,10 @@ def _without_asked(
     """Return measurements without gears about which only the user can decide."""
     gears = measured["specimen"]
     questions, bad = [], {}
-    for one in result.asked:
-        asked = question(one, measured.rows, measured.units)
-        questions.append(Finding(measured.file, *asked))
-        bad.setdefault(str(gears[one.rows[0][0]]), questions[-1])
+    for observation in result.asked:
+        words = question(observation, measured.rows, measured.units)
+        questions.append(Finding(measured.file, *words))
+        bad.setdefault(str(gears[observation.rows[0][0]]), questions[-1])
     many = len({*gears})
     some = len(bad) < many or not whole
     if skip_bad and some:
@@ -147,5 +135,5 @@ def screening_notes(result: Screening, units: Quantities) -> list[str]:
     """Return the findings of a screening, each in one sentence."""
     notes = [one.words for one in result.observations]
     more = [f"and {len(notes) - _LISTED} more findings"] if notes[_LISTED:] else []
-    hidden = [hidden_direction(units)] if result.trembling else []
+    hidden = [units.say(HIDDEN)] if result.trembling else []
     return [*notes[:_LISTED], *more, *hidden]

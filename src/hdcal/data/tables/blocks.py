@@ -8,7 +8,6 @@ readings, which are kept so that their bad cells become findings.
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -20,8 +19,7 @@ from hdcal.errors import quoted
 
 # Rows at the top, and spread over the rest, that show which columns hold numbers.
 _SAMPLE = 400
-# Rows from which a table of other columns is too large to be passed over.
-_FEWEST = 5
+_FEWEST = 5  # rows from which a table of other columns is too large to be passed over
 _SUMMARIES = {
     *("mean", "average", "avg", "sum", "total", "sd", "std", "stdev", "std dev"),
     *("median", "cv", "range", "variance", "minimum", "maximum", "min", "max"),
@@ -33,32 +31,19 @@ _COMMENT = re.compile(r"[#%]")
 
 @dataclass(frozen=True)
 class ReadTable:
-    """Readings of a source.
+    """Readings of a source."""
 
-    Attributes:
-        headers: with their units, shape (c,).
-        header_row: row of the headers in the source, or of the first reading.
-        grid: the readings.
-        named: whether there is a row of headers.
-        conflicts: unit that a row of units states against a header, by position.
-        unit_row: that row.
-        empty: positions of columns without any cell.
-        notes: what was assumed.
-        left_out: what was not read.
-        runs: number of the run of each row by repeated headers, shape (n,); None
-            without these.
-    """
-
-    headers: tuple[str, ...]
-    header_row: int
+    headers: tuple[str, ...]  # with their units, shape (c,)
+    header_row: int  # in the source, or that of the first reading
     grid: Grid
-    named: bool = True
-    conflicts: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
+    named: bool = True  # whether there is a row of headers
+    # Unit that a row of units states against a header, by position.
+    conflicts: Mapping[int, str] = field(default_factory=dict)
     unit_row: int | None = None
-    empty: frozenset[int] = frozenset()
-    notes: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
-    runs: np.ndarray | None = None
+    empty: frozenset[int] = frozenset()  # positions of columns without any cell
+    notes: tuple[str, ...] = ()  # what was assumed
+    left_out: tuple[str, ...] = ()  # what was not read
+    runs: np.ndarray | None = None  # number of the run by repeated headers, shape (n,)
 
     @property
     def rows(self) -> np.ndarray:
@@ -72,34 +57,20 @@ class ReadTable:
 
 
 class _OtherLines:
-    """Sorting of the lines that are no readings.
-
-    Args:
-        width: cells of a reading.
-        counted: positions of the columns that hold numbers.
-
-    Attributes:
-        above: number of titles above the first reading.
-        spoilt: rows of readings with a bad cell.
-        faults: row, problem and remedy of each line that is wrong.
-    """
+    """Sorting of the lines that are no readings."""
 
     def __init__(self, width: int, counted: list[int]):
-        self._width, self._counted, self.above = width, counted, 0
-        self.spoilt: list[int] = []
-        self.faults: list[tuple[int, str, str]] = []
+        # Cells of a reading, and positions of the columns that hold numbers.
+        self._width, self._counted = width, counted
+        self.above = 0  # titles above the first reading
+        self.spoilt: list[int] = []  # rows of readings with a bad cell
+        self.faults: list[tuple[int, str, str]] = []  # row, problem and remedy
         self._left: list[SourceLine] = []
 
     def sort(
         self, lines: list[SourceLine], *, titled: bool = False, below: bool = False
     ) -> None:
-        """Sort the lines between two readings.
-
-        Args:
-            lines: in their order.
-            titled: whether a heading follows them.
-            below: whether no reading follows.
-        """
+        """Sort lines that a heading follows (titled), or no reading (below)."""
         words, others = 0, []
         for line in lines:
             if self._is_spoilt(line, titled=titled):
@@ -193,7 +164,7 @@ def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
     words = "the columns differ from those of the first block"
     remedy = "Name them alike, in the same order, or split the file"
-    foreign = [one.row for one in headings if one.names != headings[0].names]
+    foreign = [other.row for other in headings if other.names != headings[0].names]
     findings.add_rows([*((row, words, remedy) for row in foreign), *others.faults])
     return _table(readings, headings, empty, others)
 
@@ -205,11 +176,7 @@ def _first_heading(
     others: _OtherLines,
     findings: FileFindings,
 ) -> Heading:
-    """Return the heading above the first reading; without one columns are numbered.
-
-    Raises:
-        InputError: it names fewer columns than the readings have.
-    """
+    """Return the heading above the first reading; without one columns are numbered."""
     heading = find_heading(lines, width)
     if heading is None:
         words = [i for i, line in enumerate(lines) if not line.counts]
@@ -226,12 +193,9 @@ def _first_heading(
 
 
 def _sample(grid: Grid) -> Grid:
-    """Return the first rows of a grid, and some of the rest."""
-    count = len(grid.rows)
-    chosen = np.zeros(count, bool)
-    chosen[:_SAMPLE] = True
-    chosen[_SAMPLE :: max(1, count // _SAMPLE)] = True
-    return grid.take(chosen)
+    place = np.arange(len(grid.rows))
+    later = (place - _SAMPLE) % max(1, len(place) // _SAMPLE) == 0
+    return grid.take((place < _SAMPLE) | later)
 
 
 def _kinds(sample: Grid) -> tuple[list[int], frozenset[int]]:
@@ -276,17 +240,13 @@ def _summaries(words: list[str]) -> np.ndarray:
     One that stands in several rows below each other is a label.
     """
     known = {word for word in {*words} if _is_summary(word)}
-    found = np.zeros(len(words), bool)
-    for place in (i for i, word in enumerate(words) if known and word in known):
-        neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
-        found[place] = words[place] not in neighbours
-    return found
+    near = zip([None, *words[:-1]], words, [*words[1:], None], strict=False)
+    return np.array([word in known and word not in (a, b) for a, word, b in near], bool)
 
 
 def _table(
     grid: Grid, headings: list[Heading], empty: frozenset[int], others: _OtherLines
 ) -> ReadTable:
-    """Return the readings of all blocks under the heading of the first one."""
     main, notes = headings[0], []
     if others.above:
         names = ", ".join(f"'{name}'" for name in main.names)
@@ -296,7 +256,7 @@ def _table(
         notes.append(f"row {main.unit_row} taken for the units of the columns")
     if len(headings) > 1:
         notes.append(f"the headers stand {len(headings)} times. If not, split the file")
-    block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
+    block = np.searchsorted([heading.last for heading in headings[1:]], grid.rows)
     runs = np.unique(block, return_inverse=True)[1]
     return ReadTable(
         headers=main.names,

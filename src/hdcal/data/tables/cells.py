@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 
 import numpy as np
 
@@ -17,8 +18,10 @@ _WITH_UNIT = re.compile(rf"([+-]?[\d.,eE+-]+)\s*({_UNITS})")
 # Whole numbers whose thousands are marked by points; by commas, at least once.
 _POINTED = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
-# Label of a row whose source states none.
-NOT_STATED = "not stated"
+# First characters of a text that a spreadsheet would run as a formula. A leading
+# apostrophe makes it show the rest as text.
+_RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t", "\r")
+NOT_STATED = "not stated"  # label of a row whose source states none
 # Index, problem and remedy of a cell.
 Fault = tuple[int, str, str]
 
@@ -47,11 +50,7 @@ def are_numbers(cells: np.ndarray) -> np.ndarray:
 
 
 def read_number(cell: str, comma: bool) -> float:
-    """Return the number in a cell.
-
-    Raises:
-        CellError: it is no finite number.
-    """
+    """Return the finite number in a cell, or raise CellError."""
     if not cell:
         raise CellError("the cell is empty", "Fill it in or leave out the row")
     cell = cell.removesuffix(unit_in(cell)).rstrip()
@@ -90,12 +89,7 @@ def has_comma(columns: Iterable[np.ndarray]) -> bool:
 
 
 def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault]]:
-    """Return the cells of a column as floats, NaN where one is wrong, and the faults.
-
-    Args:
-        cells: floats, or texts and stored numbers, shape (n,).
-        comma: whether the decimal mark of texts is a comma.
-    """
+    """Return the cells of a column as floats, NaN where wrong, and the faults."""
     if cells.dtype != object:
         return cells, []
     if (floats := _plain_floats(cells, "," if comma else ".")) is not None:
@@ -157,3 +151,21 @@ def thousands(cells: list[str]) -> list[Fault]:
         )
         for index in pointed
     ]
+
+
+def without_formula(text: str) -> str:
+    """Return a text as it may stand in a cell; numbers are no formulas."""
+    return f"'{text}" if _runs(text) else text
+
+
+def with_formula(cell: str) -> str:
+    """Return the text that `without_formula` made a cell of."""
+    return cell.removeprefix("'") if _runs(cell) else cell
+
+
+def _runs(text: str) -> bool:
+    """Tell whether a spreadsheet would run a text, less its guards."""
+    with suppress(ValueError):
+        float(text)
+        return False
+    return text.lstrip("'").startswith(_RUN)

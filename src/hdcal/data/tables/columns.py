@@ -9,7 +9,7 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, did_you_mean
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
     DIMENSIONS,
@@ -25,31 +25,20 @@ from hdcal.data.units import Unit, find_unit
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
-# Of a torsional spring, in the same order.
-_TURNING = ("angle", "torque")
-# Columns that are listed where the user has to choose.
-_SHOWN = 12
+_TURNING = ("angle", "torque")  # of a torsional spring, in the same order
+_SHOWN = 12  # columns that are listed where the user has to choose
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column that is used.
-
-    Attributes:
-        quantity: one of QUANTITIES.
-        header: as written in the file.
-        position: 0 = first column.
-        unit: unit of its numbers; None for labels.
-        guessed: whether its header is not spelt `quantity_unit`.
-        against: another unit, which its header names itself.
-    """
+    """A column that is used."""
 
     quantity: str
     header: str
-    position: int
-    unit: Unit | None = None
-    guessed: bool = False
-    against: str = ""
+    position: int  # 0 = first column
+    unit: Unit | None = None  # None of labels
+    guessed: bool = False  # its header is not spelt `quantity_unit`
+    against: str = ""  # another unit, which its header names itself
 
 
 def choose_columns(
@@ -62,17 +51,8 @@ def choose_columns(
     """Return each quantity's column by its header, or as the user named it.
 
     Where deformation and force are required and the source holds torques and no forces,
-    these are angle and torque.
-
-    Args:
-        table: the readings with their headers.
-        mapping: quantity -> header with the unit in square brackets.
-        quantities: quantities to look for.
-        required: those that must be there.
-        findings: receives one for each header that is wrong or missing.
-
-    Raises:
-        InputError: there are no headers, and the user names no column by its number.
+    these are angle and torque. The mapping is from quantities to headers with the unit
+    in square brackets, or to numbers of columns.
     """
     _check_names(table, mapping, findings)
     chooser = _Chooser(table, findings)
@@ -135,14 +115,12 @@ def _check_names(
         remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
         findings.refuse(words, remedy, table.header_row)
     for quantity in (name for name in mapping if name not in QUANTITIES):
-        near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
-        hint = f"Did you mean {near[0]}? " if near else ""
         words = f"`columns` {quantity}=… names no quantity that hdcal knows"
-        findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
+        findings.add(words, did_you_mean(quantity, [*QUANTITIES]))
 
 
 class _Chooser:
-    """Choice of one column after the other; what is wrong is added to the findings."""
+    """Choice of one column after the other, with findings on what is wrong."""
 
     def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings
@@ -240,7 +218,6 @@ class _Chooser:
         return [place for kind, place in kinds.items() if kind] or [*kinds.values()]
 
     def _where(self, fits: Callable[[Header], bool]) -> list[int]:
-        """Return the columns with a fitting header and any cells."""
         headers, empty = enumerate(self._headers), self._table.empty
         return [place for place, h in headers if place not in empty and fits(h)]
 

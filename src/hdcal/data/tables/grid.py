@@ -16,17 +16,11 @@ SEPARATORS = "\t;|,"
 
 
 class SourceLine(NamedTuple):
-    """A row of a source that is no reading, or not yet known to be one.
+    """A row of a source that is no reading, or not yet known to be one."""
 
-    Attributes:
-        row: its number in the source, 1 = first.
-        cells: texts without blanks around them.
-        fits: whether it is a row of the grid, as readings are.
-    """
-
-    row: int
-    cells: list[str]
-    fits: bool
+    row: int  # 1 = first
+    cells: list[str]  # without blanks around them
+    fits: bool  # whether it is a row of the grid, as readings are
 
     @property
     def first(self) -> str:
@@ -48,18 +42,14 @@ class SourceLine(NamedTuple):
 class Grid:
     """Rows of cells.
 
-    Attributes:
-        rows: row of the source of each, shape (n,), 1 = first.
-        columns: shape (n,) each: floats, NaN for an empty cell, where the source states
-            that a column holds numbers; else texts on one line and stored numbers.
-        loose: rows of the source with another number of cells.
-        separator: character between the cells of a text.
+    A column, shape (n,), holds floats, NaN for an empty cell, where the source states
+    that it holds numbers; else texts on one line and stored numbers.
     """
 
-    rows: np.ndarray
+    rows: np.ndarray  # of the source, shape (n,), 1 = first
     columns: list[np.ndarray]
-    loose: tuple[SourceLine, ...] = ()
-    separator: str = ""
+    loose: tuple[SourceLine, ...] = ()  # with another number of cells
+    separator: str = ""  # between the cells of a text
 
     @property
     def width(self) -> int:
@@ -121,15 +111,9 @@ def split_line(line: str, separator: str) -> list[str]:
 
 
 def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
-    """Return the grid of a DataFrame below a row of its names.
-
-    Columns that are only counted have no headers: they are asked for by number.
-
-    Args:
-        frame: the readings.
-        first: number of its first row.
-    """
+    """Return the grid of a DataFrame whose first row has a number."""
     names = [str(name) for name in frame.columns]
+    # Columns that are only counted have no headers: they are asked for by number.
     counted = all(name.isdigit() for name in names)
     header = () if counted else (SourceLine(first - 1, names, fits=True),)
     rows = np.arange(len(frame)) + (first - 1 if counted else first)
@@ -138,11 +122,7 @@ def frame_grid(frame: pd.DataFrame, first: int = 2) -> Grid:
 
 
 def memory_grid(data: Any, findings: FileFindings) -> tuple[Grid, str]:
-    """Return the grid of a table in memory, and the hash of its cells.
-
-    Raises:
-        InputError: arrays of several lengths or dimensions; headers of several levels.
-    """
+    """Return the grid of a table in memory, and the hash of its cells."""
     if hasattr(data, "to_pandas"):
         data = data.to_pandas()
     try:

@@ -5,7 +5,7 @@ import unicodedata
 from functools import cache
 from typing import NamedTuple
 
-from hdcal.data.units import Unit, find_unit, unit_names
+from hdcal.data.units import SIZES, Unit, find_unit
 
 # Dimension of each quantity that is a number.
 DIMENSIONS = {
@@ -81,23 +81,14 @@ _ADVICE = {
 
 
 class Header(NamedTuple):
-    """What a header means.
+    """What a header means."""
 
-    Attributes:
-        quantity: that its words name; empty where they name none.
-        unit_text: its unit as written; empty without one.
-        unit: that unit; None where it is none of a quantity.
-        exact: it is spelt `quantity_unit`.
-        whole: it names the quantity and nothing else.
-        excluded: it names something else about a quantity, such as a rate.
-    """
-
-    quantity: str
-    unit_text: str
-    unit: Unit | None
-    exact: bool
-    whole: bool
-    excluded: bool
+    quantity: str  # empty where its words name none
+    unit_text: str  # its unit as written; empty without one
+    unit: Unit | None  # None where that is none of a quantity
+    exact: bool  # it is spelt `quantity_unit`
+    whole: bool  # it names the quantity and nothing else
+    excluded: bool  # it names something else about a quantity, such as a rate
 
     def measures(self, quantity: str) -> bool:
         """Tell whether its unit is one of a quantity."""
@@ -150,7 +141,7 @@ def is_unit_text(text: str) -> bool:
 
 def unit_advice(text: str, quantity: str) -> str:
     """Return what to write for a text that is no unit of a quantity."""
-    names = unit_names(DIMENSIONS[quantity])
+    names = [spellings.split()[0] for spellings in SIZES[DIMENSIONS[quantity]]]
     bare = re.sub(r"[\s·*.-]", "", text)
     near = [name for name in names if name.lower() == bare.lower()]
     for words, forces in _ADVICE.items():
@@ -179,10 +170,7 @@ def _is_other(word: str) -> bool:
 
 
 def _quantity(name: str, words: list[str], unit: Unit | None) -> tuple[str, set[str]]:
-    """Return the quantity that a name means, and the words that say so.
-
-    The dimension of a unit decides between several.
-    """
+    """Return the quantity that a name with a unit means, and the words for it."""
     letter = _LETTERS.get(name.strip(), "")
     if letter and unit is not None and unit.dimension == DIMENSIONS[letter]:
         return letter, {*words}

@@ -9,8 +9,7 @@ from hdcal.data.tables.grid import SourceLine
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, is_unit_text, parse_header
 from hdcal.data.units import find_unit
 
-# Lines above the readings among which the names stand.
-_NEAR = 20
+_NEAR = 20  # lines above the readings among which the names stand
 # Words before a row of units, and names of columns of them.
 UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "unité", "単位", "单位"}
 UNIT_LABELS |= {"y_unit_label"}
@@ -18,25 +17,15 @@ _MARK = re.compile(r"\A\s*[#%*/]+\s*")
 
 
 class Heading(NamedTuple):
-    """Names and units of a block.
+    """Names and units of a block."""
 
-    Attributes:
-        names: with their units in brackets, shape (c,).
-        bare: the names as written, shape (c,).
-        row: row of the names in the source; 0 where there are none.
-        last: row of the last of names and units.
-        unit_row: row of the units; None without one.
-        cells: number of names.
-        conflicts: other unit that the row of units states, by position.
-    """
-
-    names: tuple[str, ...]
-    bare: tuple[str, ...] = ()
-    row: int = 0
-    last: int = 0
+    names: tuple[str, ...]  # with their units in brackets, shape (c,)
+    bare: tuple[str, ...] = ()  # as written, shape (c,)
+    row: int = 0  # of the names in the source; 0 where there are none
+    last: int = 0  # row of the last of names and units
     unit_row: int | None = None
-    cells: int = 0
-    conflicts: Mapping[int, str] = MappingProxyType({})
+    cells: int = 0  # number of names
+    conflicts: Mapping[int, str] = MappingProxyType({})  # units of the row of units
 
 
 def find_heading(
@@ -45,34 +34,29 @@ def find_heading(
     """Return names and units among the lines above a block.
 
     The names are the line with the most quantities, else the line right above the
-    readings or their units.
-
-    Args:
-        lines: above the block, below the one before.
-        width: cells of a reading.
-        first: heading of the first block, for those of later ones.
+    readings or their units. `first` is the heading of the first block, for later ones.
     """
     if first is not None and not first.row:
         return None
     near = lines[-_NEAR:]
-    units = next((one for one in reversed(lines) if _is_unit_line(one, near)), None)
+    units = next((line for line in lines[::-1] if _is_unit_line(line, near)), None)
     cells = _padded(units.cells if units is not None else [], width)
     texts = [cell.strip("()[] ") if is_unit_text(cell) else "" for cell in cells]
-    named = [(_quantities(one, texts), one.row, one) for one in near if one != units]
-    named = [one for one in named if _may_name(one[2], one[0], width)]
+    named = [(_quantities(n, texts), n.row, n) for n in near if n != units]
+    named = [entry for entry in named if _may_name(entry[2], entry[0], width)]
     if not named and units is not None and units in near:
         # Names of columns may be letters, as N and s are.
         named, units, texts = [(0, units.row, units)], None, [""] * width
     if not named:
         return None
     # One quantity may stand in a title too.
-    quantities, _, best = max(named, key=lambda one: (one[0] > 1 and one[0], one[1]))
+    quantities, _, best = max(named, key=lambda n: (n[0] > 1 and n[0], n[1]))
     bare = tuple(_bare_names(best, lines, width))
     last = max(best.row, units.row if units is not None else 0)
     if first is not None and bare == first.bare:
         return first._replace(row=best.row, last=last)
-    below = [one for one in lines if one != units and one.row > best.row]
-    if not quantities and (first or not all(one.counts for one in below)):
+    below = [line for line in lines if line != units and line.row > best.row]
+    if not quantities and (first or not all(line.counts for line in below)):
         return None
     return Heading(
         names=tuple(map(_with_unit, bare, texts)),

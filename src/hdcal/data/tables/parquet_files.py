@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from pyarrow import Schema, Table
     from pyarrow.dataset import Dataset
 
-# First bytes of a Parquet file.
-PARQUET = b"PAR1"
+PARQUET = b"PAR1"  # first bytes of a Parquet file
 # Tables of other kinds, of which a folder is a case.
 _OTHERS = {".csv", ".txt", ".tsv", ".xlsx", ".lvm", ".dat"}
 
@@ -44,11 +43,7 @@ def parquet_files(path: Path) -> list[str]:
 
 
 def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "Dataset":
-    """Return files as one table; names of folders such as `lot=7` are texts.
-
-    Raises:
-        InputError: they cannot be read, or their columns are of different kinds.
-    """
+    """Return files as one table; names of folders such as `lot=7` are texts."""
     try:
         import pyarrow as arrow
         from pyarrow import dataset as tables
@@ -97,11 +92,7 @@ def frame_of(table: "Table") -> pd.DataFrame:
 
 
 def parquet_grid(path: Path, findings: FileFindings) -> Grid:
-    """Return the grid of a Parquet file.
-
-    Raises:
-        InputError: it is none, or pyarrow is missing.
-    """
+    """Return the grid of a Parquet file."""
     dataset = parquet_table([str(path)], "", findings)
     table = dataset.to_table(columns=plain_columns(dataset.schema), use_threads=False)
     return frame_grid(frame_of(table))

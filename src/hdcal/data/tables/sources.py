@@ -1,24 +1,28 @@
 """Sources of tables: files of any kind, and tables in memory."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from hdcal.data.findings import FileFindings
-from hdcal.data.regular_file import why_not_readable
-from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.grid import memory_grid
+from hdcal.data.findings import FileFindings, why_not_readable
+from hdcal.data.tables.blocks import ReadTable, find_table
+from hdcal.data.tables.cells import unit_in
+from hdcal.data.tables.grid import Grid, memory_grid
+from hdcal.data.tables.headers import parse_header
+from hdcal.data.tables.headings import UNIT_LABELS
 from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
-from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text import LARGEST_FILE, decode, read_bytes, text_grid
 from hdcal.data.tables.workbook import sheet_grid
+from hdcal.data.units import find_unit
+from hdcal.errors import quoted
 
-# What findings call a table in memory.
-IN_MEMORY = "DataFrame"
+IN_MEMORY = "DataFrame"  # what findings call a table in memory
+_SHOWN = 50  # rows that show whether cells hold units
 _WORKBOOK = b"PK\x03\x04"
 # First bytes of files that are no text.
 _KINDS = {
@@ -42,17 +46,7 @@ def read_source(
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> tuple[ReadTable, str]:
-    """Return the table of a file, or of a table in memory, and the hash of its source.
-
-    Args:
-        data: a path, a DataFrame, or arrays by name.
-        findings: findings on the source.
-        encoding: encoding of a text; by default the likeliest.
-        sheet: sheet of a workbook; by default the only one with readings.
-
-    Raises:
-        InputError: it holds no table, or it is not clear which one is meant.
-    """
+    """Return the table of a file, a DataFrame or arrays by name, and its hash."""
     if is_frame(data):
         grid, sha256 = memory_grid(data, findings)
         return table_of(grid, findings), sha256
@@ -94,7 +88,6 @@ def _kind(path: Path) -> bytes:
 def _file_table(
     path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
 ) -> tuple[ReadTable, str]:
-    """Return the table of a file, and the hash of its bytes."""
     kind, notes = _kind(path), []
     if kind and encoding is not None:
         words = f"is {_KINDS[kind]}, which has no `encoding`"
@@ -123,3 +116,41 @@ def file_sha256(path: Path | str) -> str:
     """Return the hash of a file."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def table_of(grid: Grid, findings: FileFindings) -> ReadTable:
+    """Return the table in a grid; headers have the units of cells or columns of units.
+
+    A unit that changes from row to row, or differs from the header's, is a finding.
+    """
+    table = find_table(grid, findings)
+    headers, notes = [*table.headers], [*table.notes]
+
+    def refuse(name: str, units: Sequence[str]) -> None:
+        words = " and ".join(map(quoted, units))
+        problem = f"the unit of {quoted(name)} changes: {words}"
+        findings.add(problem, "Convert the readings to one unit", table.header_row)
+
+    for place, name in enumerate(headers[:-1]):
+        if headers[place + 1].strip().casefold() not in UNIT_LABELS:
+            continue
+        units = [*filter(None, table.grid.labels(place + 1)[1])]
+        if len(units) == 1 and find_unit(units[0]):
+            headers[place] = f"{name} [{units[0]}]"
+            words = f"the unit of {quoted(name)} stands in the column behind it"
+            notes.append(f"{words}: {units[0]}")
+        elif len(units) > 1 and any(map(find_unit, units)):
+            refuse(name, units[:3])
+    sample = table.grid.take(np.arange(len(table.rows)) < _SHOWN)
+    for place, name in enumerate(headers):
+        if sample.is_numeric(place) or not any(map(unit_in, sample.texts(place))):
+            continue
+        header = parse_header(name)
+        known = header.unit.name if header.unit and header.quantity else ""
+        units = [*dict.fromkeys(map(unit_in, table.grid.texts(place)))]
+        units = [unit for unit in units if unit and find_unit(unit) != header.unit]
+        if len(units) == 1 and not known:
+            headers[place] = f"{name} [{units[0]}]"
+        elif units and header.quantity:
+            refuse(name, [known, *units[:3]] if known else units[:3])
+    return replace(table, headers=tuple(headers), notes=tuple(notes))

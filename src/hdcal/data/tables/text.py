@@ -17,8 +17,7 @@ _LONGEST_LINE = 1 << 20
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
 # Signs and letters of Western languages; Chinese read as cp1252 has others.
 _WESTERN = {*"°µ²³·–äöüßÄÖÜéèêëàâçùûîïôÉÈÊÀÇñóíá"}
-# Lines beyond ASCII by which the encoding is judged.
-_JUDGED = 50
+_JUDGED = 50  # lines beyond ASCII by which the encoding is judged
 _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _HTML = re.compile(
     r"\s*<(!doctype html|html|table|head|body|\?xml[^>]*>\s*<html)", re.I
@@ -27,20 +26,14 @@ _HTML = re.compile(
 _SAMPLE = 300
 # Cells by which a line of headers may be longer than the readings below it: remarks.
 _MOST_REMARKS = 2
-# Lines of numbers between blanks that make a table.
-_FEWEST = 5
-# Characters of an empty line.
-_BLANKS = ' \t;,|"'
+_FEWEST = 5  # lines of numbers between blanks that make a table
+_BLANKS = ' \t;,|"'  # characters of an empty line
 _MARK = re.compile(r"\s*[#%*/]+\s*")
 _GAP = re.compile(r"\s{2,}")
 
 
 def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
-    """Return the bytes of a text.
-
-    Raises:
-        InputError: the file is binary, or has a line over 1 MiB.
-    """
+    """Return the bytes of a text without binary content or endless lines."""
     raw = path.read_bytes()
     if not (wide or raw.startswith(_WIDE_MARKS)) and b"\0" in raw:
         findings.refuse("is a binary file", "Save it as UTF-8 text")
@@ -54,11 +47,7 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
 def decode(
     raw: bytes, findings: FileFindings, encoding: str | None
 ) -> tuple[str, list[str]]:
-    """Return a text with plain newlines, and notes on its encoding.
-
-    Raises:
-        InputError: they are no text in it, or a web page.
-    """
+    """Return a text with plain newlines, and notes on its encoding."""
     likely = encoding or _likely(raw)
     try:
         text = raw.decode(likely)
@@ -82,7 +71,6 @@ def decode(
 
 
 def _likely(raw: bytes) -> str:
-    """Return the likeliest encoding of a text."""
     if raw.startswith(_WIDE_MARKS):
         return "utf-16"
     try:
@@ -155,8 +143,7 @@ def _cells_of(line: str, separator: str) -> list[str]:
 def _dialect(lines: list[str]) -> tuple[str, int]:
     """Return the separator with which most lines hold numbers, and their cells.
 
-    The separator is empty where no line holds two numbers, a blank for any blanks. A
-    tab or a semicolon is never part of a number; a comma may be one.
+    The separator is empty where no line holds two numbers, a blank for any blanks.
     """
     step = max(1, len(lines) // _SAMPLE)
     sample = (*lines[:_SAMPLE], *lines[_SAMPLE::step])
@@ -175,10 +162,7 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
 
 
 def _numbers(cells: list[str]) -> tuple[int, float] | None:
-    """Return the number of cells of a line, and the share of numbers among filled ones.
-
-    None of a line with fewer than two numbers.
-    """
+    """Return cells and share of numbers of a line; None with fewer than two numbers."""
     numbers = sum(map(is_number, cells))
     return (len(cells), numbers / sum(map(bool, cells))) if numbers >= 2 else None
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.formula_cells import with_formula
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import (
     NOT_STATED,
@@ -14,6 +13,7 @@ from hdcal.data.tables.cells import (
     may_hold_thousands,
     read_numbers,
     thousands,
+    with_formula,
 )
 from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS
@@ -26,11 +26,9 @@ _SLOW, _FEWEST = 0.5, 5
 def read_values(
     table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Read the used columns; what is wrong with cells is added to the findings.
+    """Return the used columns by quantity, shape (n,) each, and notes.
 
-    Returns:
-        Floats in code units (NaN where a cell is wrong) or label strings, by quantity,
-        each of shape (n,); and notes on what was assumed.
+    Floats in code units, NaN where a cell is wrong, which is a finding; or labels.
     """
     notes: list[str] = []
     values = _numbers(table, used, findings)
@@ -81,7 +79,6 @@ def _is_regular(filled: np.ndarray) -> bool:
 def _numbers(
     table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> dict[str, np.ndarray]:
-    """Return the columns of numbers in the units of the file."""
     numeric = {name: column for name, column in used.items() if name not in LABELS}
     cells = {name: table.grid.read(one.position) for name, one in numeric.items()}
     comma = has_comma(cells.values())

@@ -12,20 +12,14 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.tables.grid import Grid, stored_text
 from hdcal.errors import quoted
 
-# Largest content of an archive, unpacked.
-_LARGEST = 1 << 28
-# Rows with two numbers or more that make a sheet a table of readings.
-_FEWEST = 5
+_LARGEST = 1 << 28  # largest content of an archive, unpacked
+_FEWEST = 5  # rows with two numbers or more that make a sheet a table of readings
 
 
 def sheet_grid(
     path: Path, findings: FileFindings, sheet: str | None
 ) -> tuple[Grid, list[str]]:
-    """Return a sheet, by default the only one with readings, and a note on the choice.
-
-    Raises:
-        InputError: it is no workbook, or it is not clear which sheet is meant.
-    """
+    """Return a sheet, by default the only one with readings, and a note on that."""
     sheets = _sheets(path, findings)
     names = ", ".join(map(quoted, sheets))
     if sheet is not None:
@@ -51,7 +45,6 @@ def _is_table(grid: Grid) -> bool:
 
 
 def _sheets(path: Path, findings: FileFindings) -> dict[str, Grid]:
-    """Return the sheets by name."""
     broken = "is no workbook that can be read"
     try:
         with zipfile.ZipFile(path) as archive:

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.data.loading import derive_motion
+from hdcal.data.loading import derive_motion, sense_at_turns
 from hdcal.data.measurements.case_of import screened_case
-from hdcal.data.measurements.joining import joined
+from hdcal.data.measurements.folder import joined
 from hdcal.data.measurements.labels import further_labels, mountings, run_labels
 from hdcal.data.measurements.measurements import Measurements
 from hdcal.data.measurements.notes import mountings_note
 from hdcal.data.measurements.parquet import Parquet, read_batches
 from hdcal.data.measurements.screened import asked_range, screened
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.turning_rows import sense_at_turns
 from hdcal.errors import Finding, InputError
 from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
 from hdcal.fleets.reading.readings import FleetReadings, modulus_left, readings_of

@@ -13,13 +13,13 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.findings import LISTED
-from hdcal.data.full_scale import scale_of
 from hdcal.data.gear import at_full_scale
 from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.measurements.folder import read_gear_folder
 from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.measurements.parquet import open_parquet
 from hdcal.data.measurements.screened import screening_notes
+from hdcal.data.prior import scale_of
 from hdcal.data.reading import read_case
 from hdcal.data.scatter import require_scatter
 from hdcal.data.tables.parquet_files import is_parquet
@@ -67,7 +67,7 @@ def read_fleet(
         specimen: label of the only one that is read.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
-        how: columns, theory, reading and range.
+        how: columns and range.
 
     Raises:
         InputError: holds what is wrong with the data as a whole.

@@ -9,10 +9,10 @@ import numpy as np
 from hdcal.data.case import Case, Gear
 from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
-from hdcal.data.scatter import reading_step
 from hdcal.errors import Finding
 from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums, reading_vectors
 from hdcal.inference import distributions
+from hdcal.screening.local_fit import least_step
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ class FleetReadings:
 
     @property
     def step(self) -> float:
-        """Step of the force display [N]."""
-        return reading_step(self.case)
+        """Step of the force display, or else the least one between readings [N]."""
+        stated = self.case.gear.force_resolution
+        return stated or least_step(np.asarray(self.case.records.force))
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
         """Return sums in which every gear has the sizes of the gear file.

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.special import ndtr, stdtr
 
 from hdcal.data.records import Records
-from hdcal.data.scatter import least_step
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
@@ -33,6 +32,7 @@ from hdcal.inference.force_model.serial_correlation import (
 from hdcal.inference.force_model.values import predict_rows
 from hdcal.inference.posterior import Posterior
 from hdcal.quantities import Quantities
+from hdcal.screening.local_fit import least_step
 
 NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 # Draws that the fitted reading is averaged over: its error is then a tenth of that of
@@ -255,7 +255,7 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     the rounding of a display; `sd` [N] is that of each row given the one before.
     """
     size, far = len(sd), np.abs(left.scaled)
-    rounding = least_step(records.force) / np.sqrt(12.0)
+    rounding = least_step(np.asarray(records.force)) / np.sqrt(12.0)
     scale = np.maximum(_NORMAL * float(np.median(far)), rounding / sd)
     times = far / np.maximum(scale, 1e-300)
     chance = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
