@@ -32,26 +32,22 @@ Sizes = Mapping[str, Any]
 class Gears:
     """Gears, one for each draw; deformations and forces are along the loading.
 
-    A gear that is pulled is the mirror of one that is pressed: the sense gives numbers
-    their sign outside.
-
-    Attributes:
-        model: of the tested gear.
-        independent: effective number of draws.
-        seed: of what the draws leave open.
-        notes: unresolved causes and faults of the noise, in sentences.
-        sense: +1 for gears that are pressed, −1 for gears that are pulled.
-        shifts: of sizes from the drawing [mm], by name, (draw,).
-        deviation: of the stiffness from the tested mean, relative, (draw,).
+    A gear that is pulled is the mirror of one that is pressed: the sense, ±1, gives
+    numbers their sign outside. Shifts are of sizes from the drawing [mm], by name,
+    (draw,), the deviation is of the stiffness from the tested mean, relative, (draw,).
     """
 
     model: JointModel
-    independent: float
     seed: int = 0
     notes: tuple[str, ...] = ()
     sense: int = 1
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
     deviation: np.ndarray | float = 0.0
+
+    @property
+    def independent(self) -> float:
+        """Effective number of draws."""
+        return self.model.independent_draws
 
     @property
     def gear(self) -> Gear:
@@ -109,14 +105,10 @@ class Gears:
 
     def stresses(self, sizes: Sizes, deformation: float, temperature: Any):
         """Return the largest hoop bending stress over temperatures [MPa], (draw,)."""
-        values, rise = (
-            self.model.draws,
-            np.asarray(temperature) - self.gear.reference_temperature,
-        )
-        warm = np.max(1.0 - values["alpha"][:, None] * rise, axis=1)
-        return np.asarray(
-            peak_stress(self.made(sizes), values["E0"] * warm, deformation)
-        )
+        rise = np.asarray(temperature) - self.gear.reference_temperature
+        warm = np.max(1.0 - self.model.draws["alpha"][:, None] * rise, axis=1)
+        modulus = self.model.draws["E0"] * warm
+        return np.asarray(peak_stress(self.made(sizes), modulus, deformation))
 
     def strengths(self) -> np.ndarray | None:
         """Draw the yield strength [MPa]; None where the material has none."""
@@ -155,4 +147,4 @@ def calibrated_gears(models: Models, seed: int = 0) -> Gears:
         remedy = "Calibrate with the sizes of the gear and another theory"
         raise InputError([Finding(f"theory '{SPRING}'", words, remedy)])
     notes = *averaging_words(models), *noise_warnings(model.posterior)
-    return Gears(model, model.independent_draws, seed, notes)
+    return Gears(model, seed, notes)

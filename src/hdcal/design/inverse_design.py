@@ -171,12 +171,7 @@ class LimitedGears:
 
 
 class InverseDesign(DesignResult):
-    """The sizes that keep the limits with the least change.
-
-    Attributes:
-        design: the sizes nearest to the tested gear.
-        target: the gears to design, and their limits.
-    """
+    """The sizes that keep the limits with the least change."""
 
     template = "design/inverse_design.md.j2"
     table = "designs"

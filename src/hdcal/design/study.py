@@ -50,13 +50,9 @@ class StudyAsked(Item):
 
 
 class Study(DesignResult):
-    """The force of every design.
+    """The force of every design, with the sign of the deformation, and its stress.
 
-    Attributes:
-        designs: sizes, deformation, temperature, median and ends of the force with the
-            sign of the deformation, and the median size of the hoop bending stress
-            under the load.
-        varied: names of the columns that were varied, in the order given.
+    The columns that were varied are in the order given.
     """
 
     template = "design/study.md.j2"

@@ -39,17 +39,11 @@ _ring_mass = jit(ring_mass, static_argnames=("radial_per_read",))
 
 
 class DynamicProblem(Sampled):
-    """Data and priors of the dynamic model.
+    """Data [s, N, mm] and priors, in code units, of the dynamic model.
 
-    Attributes:
-        priors: by site name, in code units; K under the theory of the problem.
-        unit_stiffness: k_theory/E per displacement as read [mm].
-        rise: mean of T − T_ref over the test [K].
-        change: of T from its mean, padded [K]; None where it does not change.
-        time: since the first row [s]; the padding continues the last step.
-        force: on the gear, as read [N]; the padding holds the last value.
-        deformation: as read [mm], padded.
-        count: measured rows.
+    The unit stiffness is k_theory/E per displacement as read [mm], the rise the mean of
+    T − T_ref over the test [K], the change that of T from its mean [K], None where
+    there is none. Rows beyond the count are padding, with later times.
     """
 
     priors: dict[str, Prior]

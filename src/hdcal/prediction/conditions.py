@@ -35,16 +35,12 @@ _MOST_LOSS = 0.5
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of n forces.
+    """Conditions of n forces, (n,) each.
 
-    Attributes:
-        deformation: as read, or true for a load [mm], (n,).
-        temperature: of the specimen [°C], (n,).
-        loading: direction of loading, +1 in compression and -1 in tension, (n,).
-        unloading: whether the deformation is reached from a larger one, (n,).
-        quantity: which force.
-        tolerances: ± of the sizes by field of the geometry [mm].
-        factor: stiffness relative to the tested gear's [-], scalar or (n,).
+    The deformation [mm] is as read, or true for a load; the loading is +1 in
+    compression and -1 in tension; unloading is whether the deformation is reached from
+    a larger one. Tolerances are ± of sizes by field of the geometry [mm], the factor is
+    the stiffness relative to the tested gear's, scalar, (n,) or (draw, n).
     """
 
     deformation: np.ndarray
@@ -171,11 +167,8 @@ def far_findings(
 ) -> list[Finding]:
     """Return a finding where a deformation can only be in a wrong unit.
 
-    Args:
-        deformation: as given, of either sign [mm].
-        tested: the largest that was read, a size [mm].
-        reach: what no gear of this radius reaches [mm].
-        unit: of all of them.
+    Tested is the largest size that was read, the reach what no gear of this radius
+    reaches, in the same unit.
     """
     if abs(deformation) < reach and abs(deformation) <= tested * OFF:
         return []

@@ -36,18 +36,11 @@ LEAST_NOISE, LEAST_RANGE = 1e-6, 1e-9
 
 @dataclass(frozen=True)
 class Bend:
-    """The bend towards and beyond one end of the tested deformation.
+    """The bend that grows from the far end of the tested deformation to and beyond one.
 
-    Attributes:
-        end: towards which it grows [mm].
-        far: the other end [mm].
-        knots: places with residuals, 0 at the far end and 1 at the end, (k,).
-        line: weights of the residuals in the line of offset and stiffness, (2, k).
-        axes: directions of the residuals that no line absorbs, (k, m).
-        found: the residuals along these directions [N], (m,).
-        size: of the bend under each law [N], (g,).
-        variance: along each direction under each law [N²], (m, g).
-        chances: probability of each law, (g,).
+    Residuals are at k knots, 0 at the far end and 1 at the end. The line has the weight
+    of each in offset and stiffness, (2, k); along m axes no line absorbs them, (k, m):
+    there they are `found` [N], (m,), with a variance under each of g laws [N²], (m, g).
     """
 
     end: float

@@ -36,12 +36,9 @@ def simulate(
 ) -> Members:
     """Return the forces of the members of a population in every draw.
 
-    Args:
-        model: whose draws are simulated.
-        at: conditions of the forces.
-        population: members that differ from each other: readings of the tested gear and
-            mounting, new mountings, or new gears (`specimens`) in new mountings.
-        seed: of the scores of what the draws leave open.
+    Members that differ from each other are readings of the tested gear and mounting,
+    new mountings, or new gears (`specimens`) in new mountings. The seed is that of the
+    scores of what the draws leave open.
     """
     problem, draws, count = model.problem, model.draws, model.size
     reading, score = at.quantity == "reading", draw_scores(model.size, seed)
@@ -139,7 +136,7 @@ def _forces(
     """Return what `forces_of_draws` does."""
     path = _path(at, model.posterior.case.records)
     repeats = len(path.deformation) // at.size
-    found = forces_of_draws(
+    forces = forces_of_draws(
         model.problem,
         model.draws,
         path,
@@ -149,7 +146,7 @@ def _forces(
         quantity=at.quantity,
         asked=at.size,
     )
-    return tuple(map(np.asarray, found))
+    return tuple(map(np.asarray, forces))
 
 
 def _path(at: Conditions, records: Records) -> Records:

@@ -14,8 +14,7 @@ from hdcal.prediction.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.models import Models
 from hdcal.tracking.bank import CELL, FIELDS, follow_rows
 from hdcal.tracking.change_alarm import threshold_for
-from hdcal.tracking.draw_forces import draws_of
-from hdcal.tracking.first_bank import first_bank
+from hdcal.tracking.draw_forces import draws_of, first_bank
 
 SCHEMA = "hdcal.track/1"
 # Rows that one compiled program takes, beside a single one.
@@ -32,13 +31,10 @@ def _number(name: str, **more: Any) -> Any:
 
 
 class StreamReading(BaseModel):
-    """A reading of a stream.
+    """Deformation [mm] and force [N] as read, and the temperature of the specimen [°C].
 
-    Attributes:
-        deformation: as read [mm].
-        force: as read [N].
-        temperature: of the specimen [°C]; None for the reference temperature.
-        run: label of the mounting; with another one the zero may have moved.
+    Without a temperature it is the reference temperature. With another label of the
+    run, the mounting, the zero may have moved.
     """
 
     model_config = ConfigDict(
@@ -61,12 +57,9 @@ class Tracker:
         alarm_rows: mean number of readings between false alarms, 10 to 10⁹.
 
     Attributes:
-        units: names and units of what is read.
         notes: sentences on the models.
         stiffness: at the start, mean and half-width of its 95 % interval [N/mm].
-        rows: number of rows so far.
-        readings: number of rows that were readings.
-        alarms: number of alarms so far.
+        rows, readings, alarms: numbers of rows, of readings among them, and of alarms.
 
     Raises:
         NotUsable: the calibration failed its checks.
@@ -101,19 +94,11 @@ class Tracker:
         Raises:
             ValueError: a number is missing or implausible; nothing was learned.
         """
-        return self.follow(
-            [StreamReading(deformation=deformation, force=force, **more)]
-        )[0]
+        reading = StreamReading(deformation=deformation, force=force, **more)
+        return self.follow([reading])[0]
 
     def follow(self, readings: Sequence[StreamReading | str]) -> list[dict[str, Any]]:
-        """Take readings in their order, which is faster than one by one.
-
-        Args:
-            readings: each a reading, or why a line is none.
-
-        Returns:
-            A line of `hdcal track` for each, as plain data.
-        """
+        """Take readings in their order, or why a line is none; return as `update`."""
         answers, good, rows = [], [], []
         for reading in readings:
             self.rows += 1

@@ -203,10 +203,6 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
 
     One block per tested temperature (three over the range if there are many, the middle
     one if they differ by less than 3 K) and per direction that was tested.
-
-    Args:
-        models: a posterior, or several with probabilities, over which bands average.
-        interval: probability inside the bands.
     """
     case = joint(models, allow_failed=True).posterior.case
     grid, levels = _default_grid(case), _default_temperatures(case.records)

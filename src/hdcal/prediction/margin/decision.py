@@ -9,12 +9,8 @@ from hdcal.report.item import Item, Probability, quantity
 class Conformity(Item):
     """Decision on one member; limit and guard band are sizes along the loading.
 
-    Attributes:
-        guard_band_N: how far the acceptance limit lies below the limit.
-        acceptance_limit_N: largest estimate that is accepted.
-        probability_of_conformity: that one future member keeps the limit; a lower limit
-            where the draws do not resolve it.
-        false_accept_risk: that it does not, if it is accepted (specific risk).
+    The probability of conformity is a lower limit where the draws do not resolve it;
+    the risk of false acceptance is the specific one.
     """
 
     rule: Rule

@@ -23,12 +23,8 @@ _ROUGH, _UNSEEN = 0.3, 3.0
 class Exceedance(Item):
     """How probable it is that a member needs more than the capacity.
 
-    Attributes:
-        probability: of one future member, over all draws; an upper limit with 95 %
-            confidence where the draws do not resolve it.
-        lo, hi: 95 % credible interval of the share of the population.
-        at_confidence: share that is not exceeded with the stated confidence.
-        beta: reliability index −Φ⁻¹(P); a lower limit where P is an upper one.
+    Where the draws do not resolve the probability, it is an upper limit with 95 %
+    confidence, and the reliability index −Φ⁻¹(P) a lower one.
     """
 
     probability: Probability = quantity("probability that a member exceeds the limit")
@@ -41,17 +37,10 @@ class Exceedance(Item):
 
 
 class Level(Item):
-    """The force at one temperature.
+    """The force at one temperature; capacities are sizes along the loading.
 
-    Attributes:
-        tested: the data hold this deformation, temperature and direction.
-        force_N: mean of the population, 95 % credible interval.
-        member_N: one future member, 95 % predictive interval.
-        lower_bound_N: exceeded by the share `content`, with the stated confidence.
-        upper_bound_N: not exceeded by that share, with that confidence.
-        capacity_N: least that holds that share, with that confidence; a size along the
-            direction of loading.
-        capacity_median_N: the same with a confidence of a half.
+    The mean of the population has its 95 % credible interval, one future member its
+    95 % predictive interval.
     """
 
     temperature_C: float = quantity("temperature", "°C")

@@ -78,8 +78,8 @@ def margin(
     model = joint(models)
     asked = checked_request(
         model,
-        deformation,
-        temperature,
+        deformation=deformation,
+        temperature=temperature,
         limit_force=limit_force,
         given_force=given_force,
         content=content,

@@ -39,25 +39,10 @@ class CalibrationSource(Item):
 class Margin(MarginRequest, Result):
     """The force needed at a deformation, and the margin of a capacity.
 
-    Attributes:
-        levels: one per temperature.
-        worst: the level with the largest bound.
-        estimate_N: estimate of one member there.
-        expanded_uncertainty_N: half width of the coverage interval; the coverage factor
-            times the combined standard uncertainty.
-        budget: components of the uncertainty, the largest first.
-        decision: whether the force keeps the limit.
-        reached: deformation that a given force reaches.
-        causes: probability of each hypothesis that was averaged over.
-        weight_left_out: probability of hypotheses that were not calibrated.
-        beyond_tested: distance of the deformation from the tested range, as a share of
-            that range.
-        interval: probability inside the intervals.
-        posterior: of the most probable model.
-        bend_N: mean and sd of the bend at the deformation.
-        averaging: sentences on the hypotheses.
-        warnings: on the residuals and the noise.
-        turn_mm: deformation at which unloading begins.
+    Of one level per temperature the worst has the largest bound; estimate, budget and
+    decision are of one member there. `beyond_tested` is the distance from the tested
+    range as a share of it, `bend_N` mean and sd of the bend, `turn_mm` where unloading
+    begins.
     """
 
     template = "prediction/margin/report.md.j2"
