@@ -132,12 +132,11 @@ def test_a_generator_that_pulls_is_the_mirror_of_one_that_presses():
         assert two.lo == pytest.approx(-one.hi, rel=1e-9)
     assert other.stress.stress_MPa.lo == pytest.approx(found.stress.stress_MPa.lo)
     for sense, result in ((1, found), (-1, other)):
-        balance, choice = result.charts()["design"].panels
+        (balance,) = result.charts()["design"].panels
         (span,) = (mark for mark in balance.marks if isinstance(mark, Span))
         assert (span.low, span.high) == result.asked.window_mm
         bands = [mark for mark in balance.marks if isinstance(mark, Band)]
         assert len(bands) == 2 and all(np.all(sense * b.low > 0.0) for b in bands)
-        assert len(choice.marks) == 3
 
 
 @pytest.mark.parametrize(

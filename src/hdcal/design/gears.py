@@ -89,9 +89,8 @@ class Gears:
     def forces(self, deformation: Any, temperature: Any, factor: Any = 1.0):
         """Return the force on each gear, loaded from its free shape [N], (n, draw).
 
-        Deformations [mm] and temperatures [°C] have the shape (n,); the stiffness over
-        that of the tested gear is broadcast to (draw, n). Neither zeros nor drift of
-        gauges belong to the force.
+        Deformations [mm] and temperatures [°C] are (n,); the stiffness over that of the
+        tested gear is broadcast to (draw, n).
         """
         place = self.sense * np.asarray(deformation) / self.radial_per_read
         at = Conditions.of(
@@ -119,10 +118,7 @@ class Gears:
         return prior and sample_prior(prior, "yield_strength", rng, size)
 
     def next_ones(self, tolerances: Mapping, seed: int, sense: int) -> "Gears":
-        """Draw the gears that a design has to fit, from ± of sizes [mm] by name.
-
-        Sizes are uniform within known limits (JCGM 100:2008, 4.3.7).
-        """
+        """Draw the gears that a design has to fit, from ± of sizes [mm] by name."""
         rng, deviation, size = np.random.default_rng(seed), 0.0, self.model.size
         shifts = {n: rng.uniform(-w, w, size) for n, w in tolerances.items()}
         if tested := self.model.problem.specimens:
@@ -133,12 +129,7 @@ class Gears:
 
 
 def calibrated_gears(models: Models, seed: int = 0) -> Gears:
-    """Return the tested gear, in every draw.
-
-    Raises:
-        NotUsable: the calibration failed its checks.
-        InputError: the seed is invalid, or the theory has no sizes.
-    """
+    """Return the tested gear, in every draw; refuse failed checks and springs."""
     if wrong := implausible("seed", seed):
         raise InputError(wrong)
     model = joint(models)

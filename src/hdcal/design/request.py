@@ -98,11 +98,7 @@ class Asked(Item):
 
 
 def check_sizes(gears: Gears, sizes: Mapping[Any, Any], deformation: Any) -> None:
-    """Require sizes [mm], by name, that are possible in every combination.
-
-    Raises:
-        PydanticCustomError: they are not, or a deformation [mm] reaches the radius.
-    """
+    """Require sizes [mm], by name, that are possible in every combination."""
     for name in sizes:
         if not matters(SIZES[name], gears.gear.geometry, gears.theory):
             words = f"{name} changes nothing under the theory '{gears.theory}'"

@@ -123,11 +123,9 @@ def wave_generator(
 
     Args:
         models: from `calibrate` or `diagnose`.
-        window: lowest and highest deformation, radial, of the gear [mm]. At the end
-            nearer to zero the teeth begin to have backlash, at the other one they jam.
-            A generator that pulls has both below zero.
-        temperatures: at all of which a gear has to stay inside [°C]; by default the
-            reference temperature.
+        window: lowest and highest radial deformation of the gear [mm]: backlash begins
+            at the end nearer to zero, jamming at the other; below zero it is pulled.
+        temperatures: of all requirements [°C]; by default the reference.
         probability: with which the next gear has to stay inside.
         tolerances: ± of sizes [mm] by name; sizes are uniform within them.
         setting_sd: sd of the set point as built [mm].
@@ -158,7 +156,9 @@ def wave_generator(
     error, least = asked.setting_sd_mm * error, 0.5 / gears.independent
     gap = SpringGap(low, high, forces[0], forces[-1], error, least)
     middle, radius = forces[_ALONG // 2], float(gears.gear.geometry.radius)
-    rates = _usual_rates(gap, middle, radius)
+    stiffness = float(np.median(middle)) / (0.5 * (low + high))
+    softest = float(np.max(forces[-1])) / max(MOST_TRAVEL * radius - high, high)
+    rates = max(RATE_RANGE[0] * stiffness, softest), RATE_RANGE[1] * stiffness
     springs, chosen = judge_all(rates, gap, asked.probability)
     if chosen is None:
         raise InputError([_unmet(springs, asked.probability)])
@@ -234,13 +234,6 @@ def judge_all(
         else:
             below = middle.rate_N_per_mm
     return sorted(springs, key=lambda spring: spring.rate_N_per_mm), chosen
-
-
-def _usual_rates(gap: SpringGap, middle: np.ndarray, radius: float) -> Ends:
-    stiffness = float(np.median(middle)) / (0.5 * (gap.low + gap.high))
-    room = max(MOST_TRAVEL * radius - gap.high, gap.high)
-    least = float(np.max(gap.force_high)) / room
-    return max(RATE_RANGE[0] * stiffness, least), RATE_RANGE[1] * stiffness
 
 
 def _require_growing(forces: np.ndarray) -> None:

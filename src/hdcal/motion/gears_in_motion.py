@@ -42,10 +42,7 @@ def moving_draws(gears: JointModel, seed: int) -> dict[str, np.ndarray]:
 
 
 def _leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
-    """Return the force of one draw outside base and effects, by the deformation [N].
-
-    It is zero at the unloaded gear; None of a gear that was calibrated in motion.
-    """
+    """Return the force of one draw outside base and effects, zero when unloaded [N]."""
     if _LEFTOVER not in value:
         return None
 
@@ -71,8 +68,6 @@ def integrate_all(
     temperature: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the deformation of every draw, (draw, n), and its largest size [mm].
-
-    Mass [N·s²/mm] and damping [N·s/mm] have one value for each draw of `moving_draws`.
 
     Raises:
         NotUsable: a gear gives way, or a motion could not be integrated.

@@ -223,17 +223,17 @@ def _force_findings(
     if duration is not None:
         words = "a sampled force has its own duration"
         yield Finding("duration", words, "Leave it out")
-    times, forces = (np.asarray(part, float) for part in force)
+    times, forces, words = *(np.asarray(part, float) for part in force), ""
     if times.shape != forces.shape or times.ndim != 1 or len(times) < 2:
         words = "needs as many times as forces, two or more"
-        yield Finding("force", words, "Correct the table")
     elif wrong := implausible("force", forces) + implausible("force", times, "time"):
         words = f"the table holds {wrong[0].problem}"
-        yield Finding("force", words, "Correct the table")
     elif np.any(np.diff(times) <= 0.0):
-        yield Finding("force", "has times that do not rise", "Put them in order")
+        words = "has times that do not rise"
     elif not np.any(forces):
-        yield Finding("force", "is zero throughout", "Give a force in N")
+        words = "is zero throughout"
+    if words:
+        yield Finding("force", words, "Correct the table")
 
 
 def _coefficients(gears: JointModel, values, at: float, given, seed: int):

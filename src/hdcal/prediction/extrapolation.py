@@ -58,10 +58,7 @@ class Bend:
         return (np.asarray(deformation) - self.far) / (self.end - self.far)
 
     def beyond(self, deformation: np.ndarray) -> np.ndarray:
-        """Return the share of the bend that acts beside a fitted leftover [-].
-
-        The leftover covers the tested range, and the bend replaces it beyond the end.
-        """
+        """Return the share of a fitted leftover that the bend replaces [-]."""
         over = np.maximum(self.place(deformation) - 1.0, 0.0) / FADE
         return -np.expm1(-(over**2))
 
@@ -82,10 +79,7 @@ class Bend:
     def of_draws(
         self, deformation: np.ndarray, level: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and sd of the bend of each draw [N], (d, n) each.
-
-        A level between 0 and 1 selects the law of a draw by its probability, (d,).
-        """
+        """Return mean and sd of the bend of each draw [N], (d, n), by a level, (d,)."""
         mean, sd = self.law(deformation)
         law = np.searchsorted(np.cumsum(self.chances)[:-1], level)
         return mean[law], sd[law]

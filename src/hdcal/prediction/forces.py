@@ -29,10 +29,9 @@ _STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"forc
 
 
 def grid_records(deformation, temperature, sense, known_sd, gear=None) -> Records:
-    """Return rows that were not measured: immediate readings after a reset.
+    """Return immediate readings after a reset, (n,), that were not measured.
 
-    Deformation as read [mm], temperature [°C], sense of the movement (±1): (n,). Each
-    row is of a gear of its own, without memory of other rows, unless `gear` numbers
+    Each is of a gear of its own, without memory of other rows, unless `gear` numbers
     them.
     """
     zeros = np.zeros(len(deformation))

@@ -96,11 +96,7 @@ class Model:
 
 
 def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
-    """Return models with their probabilities as they were given.
-
-    Raises:
-        InputError: it is no calibrated model, or a diagnosis without any.
-    """
+    """Return models with their probabilities, or refuse what is none."""
     if isinstance(models, Posterior):
         return [(1.0, models)]
     if isinstance(models, list | tuple):
@@ -108,14 +104,11 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
             return models
         words, remedy = "are no pairs", "Give [(0.6, posterior), (0.4, other)]"
         raise InputError([Finding("models", words, remedy)])
-    held = getattr(models, "posteriors", None)
-    if held:
+    if held := getattr(models, "posteriors", None):
         return list(held.values())
     words = f"{type(models).__name__} is no calibrated model"
-    remedy = "Give what calibrate or diagnose returned, itself"
-    if held is not None:
-        words += " and a quick diagnosis holds none"
-        remedy += "; diagnose without quick"
+    words += ", and a quick diagnosis holds none"
+    remedy = "Give a calibration, or a diagnosis that was not quick"
     # A fleet, or its posterior.
     if hasattr(models, "margin"):
         remedy = "Use its method `margin`"

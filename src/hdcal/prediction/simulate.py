@@ -99,8 +99,7 @@ def gear_forces(model: JointModel, at: Conditions, *, seed: int = 0) -> np.ndarr
     """Return the force of every draw on gears by themselves [N], (draw, row).
 
     Each row is another gear, loaded from its free shape, without zeros, errors and
-    drifts of a rig. A factor on the stiffness, where sizes are not the tested ones, is
-    (row,) or (draw, row).
+    drifts of a rig.
     """
     bend, acting = _bend(model, at, draw_scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
@@ -150,10 +149,7 @@ def _forces(
 
 
 def _path(at: Conditions, records: Records) -> Records:
-    """Return the rows by which the conditions are reached, each in a gear of its own.
-
-    Unloading begins at the largest tested deformation, or here where that is larger.
-    """
+    """Return the rows that lead to the conditions, each in a gear of its own."""
     sd = usual_sd(records)
     if not at.unloading.any():
         return grid_records(at.deformation, at.temperature, at.movement, sd)
@@ -169,10 +165,7 @@ def _path(at: Conditions, records: Records) -> Records:
 
 @lru_cache(maxsize=8)
 def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
-    """Return scores of each draw by Latin hypercube sampling.
-
-    Standard normal, but for `law`, which lies between 0 and 1.
-    """
+    """Return SCORES of each draw by Latin hypercube sampling."""
     rng, even = np.random.default_rng(seed), (np.arange(count) + 0.5) / count
     levels = {name: rng.permutation(even) for name in SCORES}
     return {n: level if n == "law" else ndtri(level) for n, level in levels.items()}
@@ -202,10 +195,7 @@ def _bend(model: JointModel, at: Conditions, score) -> tuple[np.ndarray, np.ndar
 
 
 def _drifts(model: JointModel, at: Conditions, score) -> dict[str, np.ndarray]:
-    """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
-
-    They act on a reading outside the tested temperatures.
-    """
+    """Return the drift of zero [N] and frame [mm] outside the tested temperatures."""
     warm = model.posterior.case.records.temperature
     kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
     if at.quantity != "reading" or not kelvins.any():
@@ -217,10 +207,7 @@ def _drifts(model: JointModel, at: Conditions, score) -> dict[str, np.ndarray]:
 
 
 def _of_sizes(model: JointModel, at: Conditions, force, node_share) -> dict:
-    """Return the variance by the tolerance of each size [N²], (draw, row) each.
-
-    The variance by all sizes together is divided as each alone would make it.
-    """
+    """Return the variance by each tolerance [N²], (draw, row), together that of all."""
     if not at.tolerances:
         return {}
     posterior = model.posterior

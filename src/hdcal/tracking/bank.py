@@ -194,8 +194,8 @@ def _unknowns(bank: Bank, forces: RowForces):
 def _normal_score(bank: Bank, t, freedom):
     """Return the normal score of a reading in a mixture of Student distributions.
 
-    By the transformation of Wallace (Annals of Mathematical Statistics 30, 1959), with
-    an error below 0.02 from some three degrees of freedom on.
+    By Wallace (Annals of Mathematical Statistics 30, 1959), to 0.02 from some three
+    degrees of freedom on.
     """
     z = jnp.sqrt(freedom * jnp.log1p(t**2 / freedom))
     z = jnp.sign(t) * z * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)

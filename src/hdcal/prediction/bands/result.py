@@ -55,11 +55,9 @@ class Bands(Result):
     @property
     def values(self) -> dict[str, tuple[Any, ...]]:
         """Columns of the table by name; what was not fitted is null."""
-        names = {self.units.key(name): name for name in COLUMNS}
-        found = {key: getattr(self, name).tolist() for key, name in names.items()}
         return {
-            key: tuple(None if value != value else value for value in values)
-            for key, values in found.items()
+            str(key): tuple(None if value != value else value for value in values)
+            for key, values in self.to_frame().items()
         }
 
     def to_frame(self) -> pd.DataFrame:

@@ -39,7 +39,11 @@ class Reached(Item):
 
 
 def deformation_reached(
-    models: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
+    models: Sequence[Model],
+    asked: MarginRequest,
+    at: Conditions,
+    warm: float,
+    step: float,
 ) -> Reached | None:
     """Return the deformation at which the members first need the given force, if any.
 
@@ -63,7 +67,6 @@ def deformation_reached(
         tolerances=at.tolerances,
     )
     members = simulate(model, there, asked.population, seed=asked.seed)
-    step = float(model.problem.step) if asked.quantity == "reading" else 0.0
     half, size, sure = 0.5 * step, abs(force), asked.confidence
 
     def first(curve: np.ndarray, needed: float, shares: Sequence[float]):

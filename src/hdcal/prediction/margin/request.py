@@ -21,13 +21,13 @@ from hdcal.prediction.conditions import (
     excluded_findings,
     far_findings,
     population_findings,
+    share_findings,
     temperature_findings,
     usual_temperature,
     widest,
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
 from hdcal.prediction.joint import JointModel
-from hdcal.prediction.shares import share_findings
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.report.item import Count, Draws, Item
 from hdcal.report.item import quantity as labelled

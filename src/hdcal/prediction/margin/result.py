@@ -9,8 +9,7 @@ from pydantic import Field, InstanceOf, computed_field
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.budget import BudgetRow
 from hdcal.prediction.margin.charts import budget_chart, force_chart
-from hdcal.prediction.margin.decision import Conformity
-from hdcal.prediction.margin.levels import Level
+from hdcal.prediction.margin.levels import Conformity, Level
 from hdcal.prediction.margin.reached import Reached
 from hdcal.prediction.margin.request import MarginRequest, Share
 from hdcal.report.charts.chart_spec import Chart
@@ -69,6 +68,7 @@ class Margin(MarginRequest, Result):
     averaging: tuple[str, ...] = Field(exclude=True)
     warnings: tuple[str, ...] = Field(exclude=True)
     turn_mm: float = Field(exclude=True)
+    step_N: float = Field(exclude=True)
 
     @computed_field
     @property
@@ -89,17 +89,6 @@ class Margin(MarginRequest, Result):
         return "load" if is_load else _MEMBER[self.population]
 
     @property
-    def members(self) -> str:
-        """Word for several members of the population."""
-        return f"{self.member}s"
-
-    @property
-    def step_N(self) -> float:
-        """Step of the reading, 0 for a load [N]."""
-        step = float(self.posterior.problem.step)
-        return step if self.quantity == "reading" else 0.0
-
-    @property
     def facts(self) -> dict[str, str]:
         """Gear, sizes and data in words."""
         case = self.posterior.case
@@ -115,10 +104,7 @@ class Margin(MarginRequest, Result):
         return {"margin": force_chart(self), "budget": budget_chart(self)}
 
     def certificate(self, issued: "date") -> str:
-        """Return the certificate as the text of an HTML page of one A4 sheet.
-
-        Args:
-            issued: date of issue.
+        """Return the certificate, with its date of issue, as a page of HTML.
 
         Raises:
             NotUsable: the calibration failed its checks.
