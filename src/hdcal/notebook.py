@@ -5,7 +5,7 @@ from typing import Any
 
 # Class -> function that makes its `report.result.Result`, imported when needed.
 RESULTS = {
-    "DynamicPosterior": "motion.dynamic_result.dynamic_calibration_of",
+    "DynamicPosterior": "motion.dynamic_calibration.dynamic_calibration_of",
     "Posterior": "calibration.calibration.calibration_of",
 }
 

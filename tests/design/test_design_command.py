@@ -34,9 +34,8 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     obeys(found, WaveGenerator)
     assert json.loads((folder / "design.json").read_text("utf-8")) == found
     assert {"report.html", "design.svg"} < {path.name for path in folder.iterdir()}
-    assert [row["temperature_C"] for row in found["at_temperature"]] == [-20, 20, 80]
-    middle = found["at_temperature"][1]["at_middle"]
-    assert middle["lo"] < 0.4 * 205 < middle["hi"]
+    assert found["asked"]["temperature_C"] == [-20, 20, 80]
+    assert found["force_N"][1]["lo"] < 0.4 * 205 < found["force_N"][1]["hi"]
     assert here(*asked).returncode == 2
 
 

@@ -15,13 +15,16 @@ from hdcal import InputError, NotUsable, Prior, calibrate_dynamic, predict, resp
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.model_average import load_models
-from hdcal.motion.dynamic_calibration import whiteness_check
+from hdcal.motion.dynamic_calibration import (
+    DynamicCalibration,
+    dynamic_calibration_of,
+    whiteness_check,
+)
 from hdcal.motion.dynamic_problem import (
     DynamicPosterior,
     build_dynamic,
     dynamic_site_priors,
 )
-from hdcal.motion.dynamic_result import DynamicCalibration, dynamic_calibration_of
 from hdcal.motion.mode_search import highest_peak
 from hdcal.physics.linear_response import LinearGear, linear_response
 

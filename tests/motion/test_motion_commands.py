@@ -10,7 +10,7 @@ from moving import moving_case, still_posterior, write_moving
 from schema_checks import obeys
 from short import TOO_SHORT, options
 
-from hdcal.motion.dynamic_result import DynamicCalibration
+from hdcal.motion.dynamic_calibration import DynamicCalibration
 from hdcal.motion.respond import Response
 
 SMALL = ["--points", "101", "--draws", "50"]

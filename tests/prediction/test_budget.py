@@ -13,7 +13,6 @@ from posteriors import (
     stiffer,
     written_posterior,
 )
-from scipy import stats
 
 import hdcal
 
@@ -119,16 +118,3 @@ def test_certificates_are_inputs_of_a_load_with_their_sensitivities():
         assert row.type_ == "B" and row.distribution == "normal"
         assert row.standard_uncertainty == pytest.approx(SDS[site], rel=0.05)
         assert row.sensitivity_N_per_unit == pytest.approx(slope, rel=0.15)
-
-
-def test_few_readings_have_the_coverage_factor_of_student():
-    """σ known from ν degrees of freedom: the predictive law is a t."""
-    count, dof = 4000, 5.0
-    known = exact(count)
-    levels = (np.random.default_rng(2).permutation(count) + 0.5) / count
-    sigma = np.sqrt(dof / stats.chi2.ppf(levels, dof))
-    found = hdcal.margin(
-        written_posterior(known.case, {**known.draws, "sigma": sigma}), 0.1
-    )
-    expected = stats.t.ppf(0.975, dof) / np.sqrt(dof / (dof - 2.0))
-    assert found.coverage_factor == pytest.approx(expected, rel=0.02)

@@ -9,7 +9,7 @@ from scipy import stats
 from test_budget import exact
 
 import hdcal
-from hdcal.prediction.shares import RAREST
+from hdcal.prediction.conditions import RAREST
 
 
 def middle(posterior, at: float = 0.1) -> float:
@@ -54,21 +54,6 @@ def test_a_student_tail_is_exact_or_an_upper_limit(chance: float):
         assert chance < risk.probability < 0.05
     assert (chance >= 1e-3) <= risk.resolved
     assert risk.beta == pytest.approx(-stats.norm.ppf(risk.probability))
-
-
-def test_the_stated_error_is_the_scatter_over_posteriors():
-    """Independent draws of σ: the probability scatters as its error says."""
-    found, size, dof = [], 400, 6.0
-    known = exact(size)
-    for seed in range(24):
-        chi = np.random.default_rng(seed).chisquare(dof, size)
-        sigma = {"sigma": 1.5 * np.sqrt(dof / chi)}
-        posterior = written_posterior(known.case, {**known.draws, **sigma})
-        limit = 20.0 + 1.5 * stats.t.isf(0.01, dof)
-        found.append(hdcal.margin(posterior, 0.1, limit_force=limit).worst.exceedance)
-    chances = [risk.probability for risk in found]
-    expected = np.std(chances, ddof=1)
-    assert np.mean([risk.error for risk in found]) == pytest.approx(expected, rel=0.35)
 
 
 def test_draws_that_depend_on_each_other_have_a_larger_error():

@@ -23,7 +23,7 @@ from test_budget import exact
 import hdcal
 from hdcal.prediction.conditions import Conditions
 from hdcal.prediction.joint import joint
-from hdcal.prediction.margin.decision import decide
+from hdcal.prediction.margin.levels import decide
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.simulate import simulate
 from hdcal.quantities import TORQUE

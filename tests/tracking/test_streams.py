@@ -201,7 +201,7 @@ def test_intervals_hold_where_every_force_is_read_many_times(monkeypatch):
     # Chance of fewer than 20 of 25 at 95 %: 0.1 %.
     assert stiffness >= 0.8
     # Readings that count as new each time are flagged.
-    monkeypatch.setattr("hdcal.tracking.first_bank.CELLS", 0)
+    monkeypatch.setattr("hdcal.tracking.draw_forces.CELLS", 0)
     assert coarse(0.05, 12, 300)[1] < 0.7
 
 

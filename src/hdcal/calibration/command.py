@@ -100,8 +100,10 @@ def _dynamic(console: Console, case: "Case", settings: dict[str, Any]) -> int:
     """Calibrate a gear that moves, and return the exit code."""
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.posterior_file import FILE_NAME
-    from hdcal.motion.dynamic_calibration import calibrate_dynamic
-    from hdcal.motion.dynamic_result import dynamic_calibration_of
+    from hdcal.motion.dynamic_calibration import (
+        calibrate_dynamic,
+        dynamic_calibration_of,
+    )
 
     with progress_bar() as progress:
         posterior = calibrate_dynamic(case, progress=progress, **settings)

@@ -27,15 +27,15 @@ def _band(name: str, x, ends, colour: str) -> list[spec.Mark]:
     return [band, spec.Line(label=name, x=x, y=middle, colour=colour)]
 
 
-def limit_chart(found: "InverseDesign") -> spec.Chart:
+def limit_chart(result: "InverseDesign") -> spec.Chart:
     """Return the force over each free size, the others as chosen."""
-    asked, chosen, sense = found.asked, found.design, found.asked.sense
+    asked, chosen, sense = result.asked, result.design, result.asked.sense
     panels, limit = [], sense * asked.limit_force_N
     for name, bounds in asked.bounds.items():
         x = np.linspace(*bounds, _FINE)
-        forces = [found.target.forces(chosen.sizes | {name: size}) for size in x]
+        forces = [result.target.forces(chosen.sizes | {name: size}) for size in x]
         ends = sense * np.quantile(forces, _TAILS, axis=1)
-        kept = sense * np.array([found.target.kept(each) for each in forces])
+        kept = sense * np.array([result.target.kept(force) for force in forces])
         share = f"not exceeded with probability {asked.probability:g}"
         size, force = np.array([chosen.sizes[name]]), np.array([chosen.force_kept_N])
         marks = [
@@ -48,12 +48,12 @@ def limit_chart(found: "InverseDesign") -> spec.Chart:
     return spec.Chart(panels=panels)
 
 
-def balance_chart(found: "WaveGenerator") -> spec.Chart:
-    """Return spring against gear, and the probability over the spring rate."""
-    asked, spring, sense = found.asked, found.spring, found.asked.sense
+def balance_chart(result: "WaveGenerator") -> spec.Chart:
+    """Return the force of spring and gear over the deformation."""
+    asked, spring, sense = result.asked, result.spring, result.asked.sense
     low, high = asked.window_mm
     x = np.linspace(low - 1.5 * (high - low), high + 1.5 * (high - low), _FINE)
-    x, gears = x[sense * x > 0.0], found.source
+    x, gears = x[sense * x > 0.0], result.source
     factor = gears.factor({})
     marks: list[spec.Mark] = [
         spec.Span(low=low, high=high, axis="x", label="window", colour=spec.GREEN)
@@ -67,61 +67,37 @@ def balance_chart(found: "WaveGenerator") -> spec.Chart:
     force = spring.rate_N_per_mm * (spring.interference_mm - x)
     name = f"spring of {spring.rate_N_per_mm:.4g} N/mm"
     marks.append(spec.Line(label=name, x=x, y=force, colour=spec.INK, dash="dashed"))
-    balance = spec.Panel(
+    panel = spec.Panel(
         title="Balance of spring and gear",
         x="radial deformation of the gear [mm]",
         y="force on each side [N]",
         marks=marks,
         y_limits=(float(np.min(bands)), float(np.max(bands))),
-        height=3.6,
     )
-    rates, shares = np.transpose(
-        [(one.rate_N_per_mm, one.probability) for one in found.springs]
-    )
-    place = np.array([spring.rate_N_per_mm]), np.array([spring.probability])
-    least = f"required {asked.probability:g}"
-    choice = spec.Panel(
-        title="Choice of the spring",
-        x="spring rate [N/mm]",
-        y="probability inside the window",
-        marks=[
-            spec.Line(x=rates, y=shares),
-            spec.Rule(
-                at=asked.probability, label=least, colour=spec.RED, dash="dotted"
-            ),
-            spec.Points(label="chosen", x=place[0], y=place[1]),
-        ],
-        x_log=True,
-        height=3.2,
-    )
-    return spec.Chart(panels=[balance, choice])
+    return spec.Chart(panels=[panel])
 
 
-def study_chart(found: "Study") -> spec.Chart:
+def study_chart(study: "Study") -> spec.Chart:
     """Return the median force with its interval over what was varied first.
 
     There is a curve for each combination of what else was varied; of more than six only
     some.
     """
-    columns = {name: np.array(each) for name, each in found.designs.items()}
-    forces = np.stack([columns[f"force_{end}_N"] for end in ("lo", "median", "hi")])
-    kind = found.interval_kind.removeprefix("equal-tailed ")
-    title, y = f"Median and {100.0 * found.interval:g} % {kind}", "force [N]"
-    along = found.varied[0] if found.varied else "deformation_mm"
-    others, marks = [name for name in found.varied if name != along], []
-    labels = [title] * len(columns[along])
+    kind = study.interval_kind.removeprefix("equal-tailed ")
+    title = f"Median and {100.0 * study.interval:g} % {kind}"
+    along, *others = study.varied or ("deformation_mm",)
+    curves = [(title, study.designs)]
     if others:
-        texts = ([f"{name} {value}" for value in columns[name]] for name in others)
-        labels = [", ".join(row).replace("_", " ") for row in zip(*texts, strict=True)]
-    each = list(dict.fromkeys(labels))
-    kept = (
-        np.linspace(0, len(each) - 1, min(len(each), len(spec.CYCLE)))
-        .round()
-        .astype(int)
-    )
+        curves = [
+            (", ".join(f"{name} {rows[name].iloc[0]}" for name in others), rows)
+            for _, rows in study.designs.groupby(others, sort=False)
+        ]
+    marks, most = [], len(spec.CYCLE)
+    kept = np.linspace(0, len(curves) - 1, min(len(curves), most)).round().astype(int)
     for place, colour in zip(kept, spec.CYCLE, strict=False):
-        rows = np.flatnonzero(np.array(labels) == each[place])
-        rows = rows[np.argsort(columns[along][rows], kind="stable")]
-        marks += _band(each[place], columns[along][rows], forces[:, rows], colour)
-    panel = spec.Panel(title=title, x=_axis(along), y=y, marks=marks)
+        label, rows = curves[place][0].replace("_", " "), curves[place][1]
+        rows = rows.sort_values(along, kind="stable")
+        ends = rows[["force_lo_N", "force_median_N", "force_hi_N"]].to_numpy().T
+        marks += _band(label, rows[along].to_numpy(), ends, colour)
+    panel = spec.Panel(title=title, x=_axis(along), y="force [N]", marks=marks)
     return spec.Chart(panels=[panel])

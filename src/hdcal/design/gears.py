@@ -32,26 +32,22 @@ Sizes = Mapping[str, Any]
 class Gears:
     """Gears, one for each draw; deformations and forces are along the loading.
 
-    A gear that is pulled is the mirror of one that is pressed: the sense gives numbers
-    their sign outside.
-
-    Attributes:
-        model: of the tested gear.
-        independent: effective number of draws.
-        seed: of what the draws leave open.
-        notes: unresolved causes and faults of the noise, in sentences.
-        sense: +1 for gears that are pressed, −1 for gears that are pulled.
-        shifts: of sizes from the drawing [mm], by name, (draw,).
-        deviation: of the stiffness from the tested mean, relative, (draw,).
+    A gear that is pulled is the mirror of one that is pressed: the sense, ±1, gives
+    numbers their sign outside. Shifts are of sizes from the drawing [mm], by name,
+    (draw,), the deviation is of the stiffness from the tested mean, relative, (draw,).
     """
 
     model: JointModel
-    independent: float
     seed: int = 0
     notes: tuple[str, ...] = ()
     sense: int = 1
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
     deviation: np.ndarray | float = 0.0
+
+    @property
+    def independent(self) -> float:
+        """Effective number of draws."""
+        return self.model.independent_draws
 
     @property
     def gear(self) -> Gear:
@@ -93,9 +89,8 @@ class Gears:
     def forces(self, deformation: Any, temperature: Any, factor: Any = 1.0):
         """Return the force on each gear, loaded from its free shape [N], (n, draw).
 
-        Deformations [mm] and temperatures [°C] have the shape (n,); the stiffness over
-        that of the tested gear is broadcast to (draw, n). Neither zeros nor drift of
-        gauges belong to the force.
+        Deformations [mm] and temperatures [°C] are (n,); the stiffness over that of the
+        tested gear is broadcast to (draw, n).
         """
         place = self.sense * np.asarray(deformation) / self.radial_per_read
         at = Conditions.of(
@@ -109,14 +104,10 @@ class Gears:
 
     def stresses(self, sizes: Sizes, deformation: float, temperature: Any):
         """Return the largest hoop bending stress over temperatures [MPa], (draw,)."""
-        values, rise = (
-            self.model.draws,
-            np.asarray(temperature) - self.gear.reference_temperature,
-        )
-        warm = np.max(1.0 - values["alpha"][:, None] * rise, axis=1)
-        return np.asarray(
-            peak_stress(self.made(sizes), values["E0"] * warm, deformation)
-        )
+        rise = np.asarray(temperature) - self.gear.reference_temperature
+        warm = np.max(1.0 - self.model.draws["alpha"][:, None] * rise, axis=1)
+        modulus = self.model.draws["E0"] * warm
+        return np.asarray(peak_stress(self.made(sizes), modulus, deformation))
 
     def strengths(self) -> np.ndarray | None:
         """Draw the yield strength [MPa]; None where the material has none."""
@@ -127,10 +118,7 @@ class Gears:
         return prior and sample_prior(prior, "yield_strength", rng, size)
 
     def next_ones(self, tolerances: Mapping, seed: int, sense: int) -> "Gears":
-        """Draw the gears that a design has to fit, from ± of sizes [mm] by name.
-
-        Sizes are uniform within known limits (JCGM 100:2008, 4.3.7).
-        """
+        """Draw the gears that a design has to fit, from ± of sizes [mm] by name."""
         rng, deviation, size = np.random.default_rng(seed), 0.0, self.model.size
         shifts = {n: rng.uniform(-w, w, size) for n, w in tolerances.items()}
         if tested := self.model.problem.specimens:
@@ -141,12 +129,7 @@ class Gears:
 
 
 def calibrated_gears(models: Models, seed: int = 0) -> Gears:
-    """Return the tested gear, in every draw.
-
-    Raises:
-        NotUsable: the calibration failed its checks.
-        InputError: the seed is invalid, or the theory has no sizes.
-    """
+    """Return the tested gear, in every draw; refuse failed checks and springs."""
     if wrong := implausible("seed", seed):
         raise InputError(wrong)
     model = joint(models)
@@ -155,4 +138,4 @@ def calibrated_gears(models: Models, seed: int = 0) -> Gears:
         remedy = "Calibrate with the sizes of the gear and another theory"
         raise InputError([Finding(f"theory '{SPRING}'", words, remedy)])
     notes = *averaging_words(models), *noise_warnings(model.posterior)
-    return Gears(model, model.independent_draws, seed, notes)
+    return Gears(model, seed, notes)

@@ -72,10 +72,9 @@ class LimitAsked(request.Asked):
 
 
 class Candidate(Stress):
-    """Sizes with their force and stress.
+    """Sizes with their force and stress; the distance is √Σ (ln x/x₀)².
 
-    The distance is √Σ (ln x/x₀)². What is kept is not exceeded with the required
-    probability; without a known strength no share of the stress is kept.
+    What is kept is not exceeded with the required probability.
     """
 
     sizes_mm: dict[str, float] = quantity("sizes", "mm")
@@ -92,7 +91,7 @@ class Candidate(Stress):
         return {f"{name}_mm": value for name, value in self.sizes_mm.items()}
 
     def columns(self) -> dict[str, Any]:
-        """Return numbers and texts by the names of columns, the sizes among them."""
+        """Return numbers and texts by column, the sizes among them."""
         return super().columns() | self.sizes
 
 
@@ -145,10 +144,9 @@ class LimitedGears:
         )
 
     def nearest(self) -> Candidate:
-        """Return the sizes nearest to the tested ones that keep the limits.
+        """Return the sizes nearest to the tested ones that keep the limits, if any.
 
-        By sequential quadratic programming in the logarithms of the sizes, where the
-        limits are nearly straight. If none keep them, the result does not either.
+        In the logarithms of the sizes the limits are nearly straight.
         """
         bounds = np.log([*self.asked.bounds.values()])
         start = np.log([self.gears.size_of(name) for name in self.asked.bounds])
@@ -171,12 +169,7 @@ class LimitedGears:
 
 
 class InverseDesign(DesignResult):
-    """The sizes that keep the limits with the least change.
-
-    Attributes:
-        design: the sizes nearest to the tested gear.
-        target: the gears to design, and their limits.
-    """
+    """The sizes that keep the limits with the least change."""
 
     template = "design/inverse_design.md.j2"
     table = "designs"
@@ -217,12 +210,10 @@ def inverse_design(
         vary: lowest and highest value of each free size [mm]: wall_thickness_mm,
             radius_mm, length_mm, load_height_mm.
         limit_force: not to be exceeded [N]: its size, or with the force's sign.
-        deformation: radial, of the gear [mm]; negative where it is pulled; by default
-            the gear's nominal one.
-        temperatures: at all of which the limits hold [°C]; by default the reference.
+        deformation: radial [mm], negative where pulled; by default the nominal one.
+        temperatures: of all limits [°C]; by default the reference.
         probability: with which the next gear keeps each limit.
-        limit_stress: largest hoop bending stress [MPa]; by default the material's
-            yield strength where that is known.
+        limit_stress: largest hoop bending stress [MPa]; by default the yield strength.
         tolerances: ± of sizes [mm] by name; sizes are uniform within them.
         seed: of the scatter.
 

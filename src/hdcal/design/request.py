@@ -8,11 +8,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from hdcal.data.gear_file.validation import fault, within
 from hdcal.design.gears import Gears
-from hdcal.prediction.sizes import SIZES, matters
+from hdcal.errors import Finding
+from hdcal.prediction.conditions import temperature_findings
+from hdcal.prediction.sizes import SIZES, check_tolerances, matters
 from hdcal.report.item import Item
 
-# More than this loss of Young's modulus is a slip of the unit [-].
-_MOST_LOSS = 0.5
 # Draws that have to fall outside for a probability to be estimated.
 _LEAST_OUTSIDE = 10
 
@@ -34,12 +34,14 @@ def _nominal(given: Any, info: ValidationInfo) -> Any:
     return nominal * gears_of(info).radial_per_read
 
 
+def _refuse(findings: list[Finding]) -> None:
+    for finding in findings:
+        raise fault(finding.problem, finding.remedy)
+
+
 def _possible(temperature: float, info: ValidationInfo) -> float:
-    gears = gears_of(info)
-    rise = abs(temperature - gears.gear.reference_temperature)
-    if np.median(gears.model.draws["alpha"]) * rise >= _MOST_LOSS:
-        words = "the linear change of E with T would lose half of Young's modulus"
-        raise fault(words, "Give it in °C")
+    gears, levels = gears_of(info), np.array([temperature])
+    _refuse(temperature_findings(gears.gear, gears.model.draws, levels))
     return temperature
 
 
@@ -60,11 +62,8 @@ def _countable(probability: float, info: ValidationInfo) -> float:
 
 
 def _of_sizes(tolerances: dict, info: ValidationInfo) -> dict:
-    for name, width in tolerances.items():
-        size = gears_of(info).size_of(name)
-        if not 0.0 < width < 0.5 * size:
-            words = f"{name} = {width:g} is no tolerance of {size:g} mm"
-            raise fault(words, "Give the ± part in mm, such as 0.02")
+    gears = gears_of(info)
+    _refuse(check_tolerances(tolerances, gears.gear.geometry, gears.theory))
     return tolerances
 
 
@@ -82,13 +81,12 @@ Bounds = Annotated[tuple[Size, Size], AfterValidator(ascending)]
 Deformation = Annotated[float, within("deformation")]
 NominalDeformation = Annotated[Deformation, BeforeValidator(_nominal)]
 Window = Annotated[tuple[Deformation, Deformation], AfterValidator(ascending)]
-Temperature = Annotated[float, within("temperature"), AfterValidator(_possible)]
+Temperature = Annotated[float, AfterValidator(_possible)]
 _Levels = Annotated[
     tuple[Temperature, ...], BeforeValidator(_with_reference), Field(max_length=1000)
 ]
 _Probability = Annotated[float, within("probability"), AfterValidator(_countable)]
-_Tolerance = Annotated[float, within("tolerances")]
-_Tolerances = Annotated[dict[SizeName, _Tolerance], AfterValidator(_of_sizes)]
+_Tolerances = Annotated[dict[SizeName, float], AfterValidator(_of_sizes)]
 
 
 class Asked(Item):
@@ -100,11 +98,7 @@ class Asked(Item):
 
 
 def check_sizes(gears: Gears, sizes: Mapping[Any, Any], deformation: Any) -> None:
-    """Require sizes [mm], by name, that are possible in every combination.
-
-    Raises:
-        PydanticCustomError: they are not, or a deformation [mm] reaches the radius.
-    """
+    """Require sizes [mm], by name, that are possible in every combination."""
     for name in sizes:
         if not matters(SIZES[name], gears.gear.geometry, gears.theory):
             words = f"{name} changes nothing under the theory '{gears.theory}'"

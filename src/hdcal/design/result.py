@@ -37,12 +37,9 @@ class DesignResult(Result):
     """What the results of designs and studies share.
 
     Probabilities are counted among draws; half of an independent draw remains
-    uncertain.
-
-    Attributes:
-        far_sizes: sizes more than a fifth off those of the tested gear [mm].
-        untested: least and largest value of a deformation [mm] or temperature [°C]
-            that no reading covers, and those of the readings.
+    uncertain. `far_sizes` are more than a fifth off those of the tested gear [mm];
+    `untested` has the ends of deformations [mm] or temperatures [°C] that no reading
+    covers, and those of the readings.
     """
 
     source: InstanceOf[Gears] = Field(exclude=True)

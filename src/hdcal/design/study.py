@@ -50,13 +50,9 @@ class StudyAsked(Item):
 
 
 class Study(DesignResult):
-    """The force of every design.
+    """The force of every design, with the sign of the deformation, and its stress.
 
-    Attributes:
-        designs: sizes, deformation, temperature, median and ends of the force with the
-            sign of the deformation, and the median size of the hoop bending stress
-            under the load.
-        varied: names of the columns that were varied, in the order given.
+    The columns that were varied are in the order given.
     """
 
     template = "design/study.md.j2"
@@ -149,11 +145,8 @@ def _designs(gears: Gears, table: pd.DataFrame, interval: float) -> pd.DataFrame
 
 
 def force_quantiles(gears: Gears, at, warm, factor, shares) -> np.ndarray:
-    """Return quantiles of the force over the draws for every design [N], (q, d).
-
-    Deformations [mm], temperatures [°C] and factors on the stiffness are (d,).
-    """
+    """Return quantiles of the force over the draws for every design [N], (q, d)."""
     step = max(1, _BLOCK // gears.model.size)
     rows = (slice(start, start + step) for start in range(0, len(at), step))
-    each = (gears.forces(at[part], warm[part], factor[part]) for part in rows)
-    return np.concatenate([np.quantile(one, shares, axis=1) for one in each], axis=1)
+    blocks = (gears.forces(at[part], warm[part], factor[part]) for part in rows)
+    return np.concatenate([np.quantile(f, shares, axis=1) for f in blocks], axis=1)

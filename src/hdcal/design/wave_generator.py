@@ -1,7 +1,18 @@
-"""An elastic wave generator: the softest spring that keeps a gear inside a window."""
+"""An elastic wave generator: the softest spring that keeps a gear inside a window.
+
+A spring of rate c presses on the gear from inside at each of two opposed places. Its
+free end stands at x beyond the undeformed gear, so that in balance
+
+    c (x − ω) = F(ω, T),
+
+with force F and radial deformation ω of one side. F grows with ω; so does ω + F(ω)/c,
+and ω ≥ lo exactly if x ≥ lo + F(lo)/c, ω ≤ hi exactly if x ≤ hi + F(hi)/c. A gear is
+inside the window at all temperatures exactly if x lies in one interval, so that
+every probability here is a count of intervals: no equation has to be solved.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
@@ -11,11 +22,10 @@ from hdcal.design.charts import balance_chart
 from hdcal.design.gears import calibrated_gears
 from hdcal.design.request import Asked, Window, check_sizes, gears_of
 from hdcal.design.result import DesignResult, Ends, Stress, shared_fields
-from hdcal.design.springs import Kept, Spring, SpringGap, judge_all, kept_at
 from hdcal.errors import Finding, InputError
 from hdcal.prediction.models import Models
 from hdcal.report.charts.chart_spec import Chart
-from hdcal.report.item import Interval, quantity
+from hdcal.report.item import Interval, Item, Probability, quantity
 
 # Range of the spring rate, relative to the stiffness of the gear.
 RATE_RANGE = (0.01, 100.0)
@@ -24,6 +34,9 @@ RATE_RANGE = (0.01, 100.0)
 MOST_TRAVEL = 0.25
 # Points of the window at which the force has to grow with deformation.
 _ALONG = 9
+# Number of rates, evenly spaced in their logarithm, and of bisections between two of
+# them: the rate is then known to 1 %.
+_RATES, _HALVINGS = 61, 4
 
 
 class WindowAsked(Asked):
@@ -49,13 +62,29 @@ class WindowAsked(Asked):
         return -1 if self.window_mm[0] < 0.0 else 1
 
 
-class KeptAt(Kept):
-    """Forces and probabilities with the chosen spring, at one temperature."""
+class SpringGap(NamedTuple):
+    """A window [mm] and the gears that have to stay inside.
 
-    temperature_C: float = quantity("temperature", "°C")
-    at_lo: Interval = quantity("force at the lower end", "N")
-    at_middle: Interval = quantity("force in the middle", "N")
-    at_hi: Interval = quantity("force at the upper end", "N")
+    Forces at its ends [N] are (temperature, draw); the error is that by which x comes
+    out too large [mm], (draw,); `least` is the probability of what no draw shows.
+    """
+
+    low: float
+    high: float
+    force_low: np.ndarray
+    force_high: np.ndarray
+    error: np.ndarray
+    least: float = 0.0
+
+
+class Spring(Item):
+    """A spring rate c with its best set point x, one for every gear."""
+
+    probability: Probability = quantity("probability inside the window")
+    zero_backlash: Probability = quantity("probability of no backlash")
+    no_jam: Probability = quantity("probability of no jam")
+    rate_N_per_mm: float = quantity("spring rate", "N/mm")
+    interference_mm: float = quantity("set point", "mm")
 
 
 class WaveGenerator(DesignResult):
@@ -72,14 +101,8 @@ class WaveGenerator(DesignResult):
     asked: WindowAsked
     spring: Spring
     springs: tuple[Spring, ...]
-    at_temperature: tuple[KeptAt, ...]
+    force_N: tuple[Interval, ...] = quantity("force in the middle", "N")
     stress: Stress
-
-    @property
-    def at_reference(self) -> KeptAt:
-        """Forces and probabilities at the temperature nearest to the reference."""
-        reference = self.source.gear.reference_temperature
-        return min(self.at_temperature, key=lambda o: abs(o.temperature_C - reference))
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return spring against gear, and the choice of the spring."""
@@ -100,11 +123,9 @@ def wave_generator(
 
     Args:
         models: from `calibrate` or `diagnose`.
-        window: lowest and highest deformation, radial, of the gear [mm]. At the end
-            nearer to zero the teeth begin to have backlash, at the other one they jam.
-            A generator that pulls has both below zero.
-        temperatures: at all of which a gear has to stay inside [°C]; by default the
-            reference temperature.
+        window: lowest and highest radial deformation of the gear [mm]: backlash begins
+            at the end nearer to zero, jamming at the other; below zero it is pulled.
+        temperatures: of all requirements [°C]; by default the reference.
         probability: with which the next gear has to stay inside.
         tolerances: ± of sizes [mm] by name; sizes are uniform within them.
         setting_sd: sd of the set point as built [mm].
@@ -135,44 +156,84 @@ def wave_generator(
     error, least = asked.setting_sd_mm * error, 0.5 / gears.independent
     gap = SpringGap(low, high, forces[0], forces[-1], error, least)
     middle, radius = forces[_ALONG // 2], float(gears.gear.geometry.radius)
-    rates = _usual_rates(gap, middle, radius)
+    stiffness = float(np.median(middle)) / (0.5 * (low + high))
+    softest = float(np.max(forces[-1])) / max(MOST_TRAVEL * radius - high, high)
+    rates = max(RATE_RANGE[0] * stiffness, softest), RATE_RANGE[1] * stiffness
     springs, chosen = judge_all(rates, gap, asked.probability)
     if chosen is None:
         raise InputError([_unmet(springs, asked.probability)])
 
-    def mirrored(one: Spring) -> Spring:
-        place = {"interference_mm": asked.sense * one.interference_mm}
-        return one.model_copy(update=place)
+    def mirrored(spring: Spring) -> Spring:
+        place = {"interference_mm": asked.sense * spring.interference_mm}
+        return spring.model_copy(update=place)
 
     return WaveGenerator(
         **shared_fields(gears, asked.window_mm, levels, {}),
         asked=asked,
         spring=mirrored(chosen),
         springs=tuple(map(mirrored, springs)),
-        at_temperature=_kept(chosen, gap, middle, asked),
+        force_N=tuple(Interval.of(asked.sense * force) for force in middle),
         stress=Stress.of(gears, gears.stresses({}, high, levels)),
     )
 
 
-def _usual_rates(gap: SpringGap, middle: np.ndarray, radius: float) -> Ends:
-    stiffness = float(np.median(middle)) / (0.5 * (gap.low + gap.high))
-    room = max(MOST_TRAVEL * radius - gap.high, gap.high)
-    least = float(np.max(gap.force_high)) / room
-    return max(RATE_RANGE[0] * stiffness, least), RATE_RANGE[1] * stiffness
+def set_points(rate: float, gap: SpringGap) -> np.ndarray:
+    """Return the ends of the x at which each gear stays inside [mm], (2, draw).
+
+    There is none where the first end is larger.
+    """
+    low = gap.low + np.max(gap.force_low, axis=0) / rate
+    high = gap.high + np.min(gap.force_high, axis=0) / rate
+    return np.stack([low, high]) - gap.error
 
 
-def _kept(
-    spring: Spring, gap: SpringGap, middle: np.ndarray, asked: WindowAsked
-) -> tuple[KeptAt, ...]:
-    found = []
-    for row, warm in enumerate(asked.temperature_C):
-        ends = np.stack([gap.force_low[row], middle[row], gap.force_high[row]])
-        lo, half, hi = map(Interval.of, (asked.sense * ends)[:: asked.sense])
-        here = gap._replace(force_low=ends[:1], force_high=ends[2:])
-        kept: dict = kept_at(spring.rate_N_per_mm, spring.interference_mm, here)
-        kept |= {"temperature_C": warm, "at_lo": lo, "at_middle": half, "at_hi": hi}
-        found.append(KeptAt(**kept))
-    return tuple(found)
+def best_common(low: np.ndarray, high: np.ndarray) -> float:
+    """Return the point that lies in most of the intervals [low, high].
+
+    If several stretches are equally good, it is the middle of the longest one.
+    """
+    full = low <= high
+    starts, ends = np.sort(low[full]), np.sort(high[full])
+    if not len(starts):
+        return float(np.mean(0.5 * (low + high)))
+    # Between two neighbouring ends the count is constant; starts come first in ties.
+    edges = np.concatenate([starts, ends])
+    change = np.concatenate([np.ones(len(starts)), -np.ones(len(ends))])
+    order = np.lexsort((-change, edges))
+    edges, count = edges[order], np.cumsum(change[order])
+    most = np.flatnonzero(count[:-1] == count.max())
+    widest = most[np.argmax(edges[most + 1] - edges[most])]
+    return float(0.5 * (edges[widest] + edges[widest + 1]))
+
+
+def judge(rate: float, gap: SpringGap) -> Spring:
+    """Return the best common set point at a rate [N/mm]."""
+    low, high = set_points(rate, gap)
+    x = best_common(low, high)
+    above, below = x >= low, x <= high
+    kept = {"probability": above & below, "zero_backlash": above, "no_jam": below}
+    ends = gap.least, 1.0 - gap.least
+    shares = {name: float(np.clip(gears.mean(), *ends)) for name, gears in kept.items()}
+    return Spring(rate_N_per_mm=rate, interference_mm=x, **shares)
+
+
+def judge_all(
+    rates: tuple[float, float], gap: SpringGap, required: float
+) -> tuple[list[Spring], Spring | None]:
+    """Return springs between two rates [N/mm], and the softest suitable one or None."""
+    springs = [judge(float(rate), gap) for rate in np.geomspace(*rates, _RATES)]
+    met = [row for row, each in enumerate(springs) if each.probability >= required]
+    if not met:
+        return springs, None
+    chosen, below = springs[met[0]], springs[max(met[0] - 1, 0)].rate_N_per_mm
+    for _ in range(_HALVINGS if met[0] else 0):
+        middle = judge(float(np.sqrt(below * chosen.rate_N_per_mm)), gap)
+        springs.append(middle)
+        if middle.probability >= required:
+            chosen = middle
+        else:
+            below = middle.rate_N_per_mm
+    return sorted(springs, key=lambda spring: spring.rate_N_per_mm), chosen
 
 
 def _require_growing(forces: np.ndarray) -> None:
@@ -185,7 +246,7 @@ def _require_growing(forces: np.ndarray) -> None:
 
 
 def _unmet(springs: Sequence[Spring], required: float) -> Finding:
-    best, (soft, *_, stiff) = max(springs, key=lambda one: one.probability), springs
+    best, (soft, *_, stiff) = max(springs, key=lambda each: each.probability), springs
     words = f"no spring rate between {soft.rate_N_per_mm:.4g} and "
     words += f"{stiff.rate_N_per_mm:.4g} N/mm keeps it with probability {required:g}: "
     words += f"the best is {best.rate_N_per_mm:.4g} N/mm with {best.probability:.4g}"

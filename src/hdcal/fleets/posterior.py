@@ -26,7 +26,7 @@ from hdcal.inference.posterior_file import (
     read_tree,
 )
 from hdcal.inference.posterior_tree import dataset, group_of, joined_draws
-from hdcal.prediction.shares import share_findings
+from hdcal.prediction.conditions import share_findings
 from hdcal.quantities import BY_LOAD, Quantities
 from hdcal.report.item import INTERVAL, Count, Digest, Item, Words
 from hdcal.report.result import Result

@@ -25,20 +25,17 @@ def response_chart(motion: pd.DataFrame) -> Chart:
     """Return the band of the deformation and the force, from `Response.motion`."""
     table, time, axis = _drawn(motion)
     tested, marks = table.tested.to_numpy(), []
-    for rows, words, is_tested in (
-        (tested, "", True),
-        (beyond(tested), ", not tested", False),
-    ):
+    for rows, words in ((tested, ""), (beyond(tested), ", not tested")):
         if rows.any():
             low, middle, high = (
                 np.where(rows, table[f"deformation_{end}_mm"], np.nan)
                 for end in ("lo", "median", "hi")
             )
-            band = {"x": time, "low": low, "high": high, "hatched": not is_tested}
-            marks.append(Band(label=f"95 % credible band{words}", **band))
-            dash = "solid" if is_tested else "dotted"
-            line = Line(label=f"median{words}", x=time, y=middle, dash=dash, width=1.0)
-            marks.append(line)
+            label, dash = f"95 % credible band{words}", "dotted" if words else "solid"
+            hatched = bool(words)
+            marks.append(Band(label=label, x=time, low=low, high=high, hatched=hatched))
+            label = f"median{words}"
+            marks.append(Line(label=label, x=time, y=middle, dash=dash, width=1.0))
     look = {"height": 3.6, "legend_beside": True}
     panel = Panel(x=axis, y="deformation [mm]", marks=[*marks, Rule(at=0.0)], **look)
     return Chart(panels=[panel, _force(table, time, axis)], share_x=True)

@@ -1,11 +1,14 @@
 """Calibration of mass, damping and stiffness from the record of a gear in motion."""
 
 import time
+from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import numpy as np
+import pandas as pd
+from pydantic import Field, computed_field
 from scipy.special import chdtrc
 
 from hdcal.data.case import Case, Theory, require_case, require_force
@@ -17,7 +20,9 @@ from hdcal.inference.force_model.assembly import (
     run_settings,
 )
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.motion.charts import motion_chart
 from hdcal.motion.dynamic_problem import (
+    SITES,
     DynamicPosterior,
     DynamicProblem,
     build_dynamic,
@@ -27,6 +32,15 @@ from hdcal.motion.dynamic_problem import (
     predict_motion,
 )
 from hdcal.motion.mode_search import highest_peak
+from hdcal.report.charts.chart_spec import Chart
+from hdcal.report.charts.draws_charts import prior_chart
+from hdcal.report.item import TAILS, Interval, Words, quantity
+from hdcal.report.posterior_result import (
+    PARAMETER_NAMES,
+    ParameterEstimate,
+    PosteriorResult,
+    posterior_fields,
+)
 
 FEWEST_ROWS = 20
 _WHITE, _RATE = "residuals are noise", "rows resolve the vibration"
@@ -35,6 +49,11 @@ _LEAST_P, _LAGS = 1e-3, 20
 _LEAST_PER_PERIOD = 6.0
 # Derived quantities whose chains must have mixed.
 _DERIVED = ("stiffness", "damping", "natural_frequency")
+_REQUIRED = {"required": ["K", "E0", *SITES], "propertyNames": {**PARAMETER_NAMES}}
+# Draws of the bands; of long records fewer, to bound the numbers in memory.
+_DRAWS, _FEWEST, _MOST_NUMBERS = 1000, 100, 50_000_000
+# Rows whose quantiles are computed together.
+_ROWS = 10_000
 
 
 def calibrate_dynamic(
@@ -50,19 +69,9 @@ def calibrate_dynamic(
     """Calibrate m ÿ + c ẏ + k y = F(t) against a time series.
 
     The force is exact and linear between the rows; the deformation is read with an
-    offset and white noise; k follows the temperature.
-
-    Args:
-        case: from `read_case`; one run, with time.
-        theory: overrides the gear's theory.
-        chains: independent chains, two or more.
-        warmup: iterations of adaptation per chain.
-        draws: draws kept per chain.
-        seed: of `jax.random.key`; the same seed gives the same draws.
-        progress: called with (iterations done, iterations in all).
-
-    Returns:
-        The posterior; it may have failed its checks, see `Posterior.usable`.
+    offset and white noise; k follows the temperature. The case holds one run, with
+    time; settings are those of `calibrate`. The posterior may have failed its checks,
+    see `Posterior.usable`.
 
     Raises:
         InputError: the record does not suit the model.
@@ -115,8 +124,8 @@ def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> dict[st
     slopes, sd = _slopes(problem, best, free), best["deformation_sigma"]
     by_row = {}
     if np.prod(sampled.shape) * problem.count <= MOST_LOG_LIKELIHOODS:
-        each = np.asarray(_pointwise(problem, sampled.values))
-        by_row["deformation"] = each[..., : problem.count]
+        rows = np.asarray(_pointwise(problem, sampled.values))
+        by_row["deformation"] = rows[..., : problem.count]
     return dict(
         log_likelihood=by_row,
         sensitivities={
@@ -162,3 +171,79 @@ def _rate_check(problem: DynamicProblem, values) -> Check:
         return Check(_RATE, "passed", words)
     remedy = "the force between rows is taken as straight; sample faster"
     return Check(_RATE, "warning", f"{words}: {remedy}")
+
+
+class DynamicCalibration(PosteriorResult):
+    """A dynamic calibration, at the mean temperature of the test, and its bands."""
+
+    template = "motion/dynamic.md.j2"
+
+    format: Literal["hdcal.dynamic-calibration/3"] = "hdcal.dynamic-calibration/3"
+    parameters: dict[str, ParameterEstimate] = Field(json_schema_extra={**_REQUIRED})
+    natural_frequency_Hz: Interval = quantity("natural frequency", "Hz")
+    damped_frequency_Hz: Interval = quantity("frequency with damping", "Hz")
+    damping_ratio: Interval = quantity("damping ratio ζ")
+    damping_N_s_per_mm: Interval = quantity("damping c", "N·s/mm")
+    bands: pd.DataFrame = Field(exclude=True)
+
+    @computed_field
+    @property
+    def assumptions(self) -> tuple[Words, ...]:
+        """Assumptions of the model, in sentences."""
+        return self.lines("assumptions")
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the record with bands, and priors."""
+        priors = prior_chart(self.posterior)
+        return {"motion": motion_chart(self.bands), "priors": priors}
+
+
+def dynamic_calibration_of(posterior: DynamicPosterior) -> DynamicCalibration:
+    """Return a dynamic calibration as a result."""
+    draws = posterior.draws
+    ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
+    damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
+    return DynamicCalibration(
+        **posterior_fields(posterior),
+        natural_frequency_Hz=Interval.of(frequency),
+        damped_frequency_Hz=Interval.of(damped),
+        damping_ratio=Interval.of(ratio),
+        damping_N_s_per_mm=Interval.of(draws["damping"]),
+        bands=motion_bands(posterior),
+    )
+
+
+def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> pd.DataFrame:
+    """Return the record with equal-tailed 95 % bands, a row per reading."""
+    problem, draws = posterior.moving, posterior.draws
+    count = int(np.clip(_MOST_NUMBERS // problem.count, _FEWEST, _DRAWS))
+    rows = np.linspace(0, len(draws["mass"]) - 1, count).astype(int)
+    values = {name: each[rows] for name, each in draws.items()}
+    real = slice(problem.count)
+    mean = np.asarray(_each_motion(problem, values))[:, real]
+    # The same quantile of the noise in all rows of a draw keeps the band smooth.
+    noise = np.random.default_rng(seed).normal(0.0, values["deformation_sigma"])
+    parts = np.array_split(mean, -(-mean.shape[1] // _ROWS), axis=1)
+    quantiles = [
+        [np.quantile(draws, TAILS, axis=0) for draws in (part, part + noise[:, None])]
+        for part in parts
+    ]
+    (low, middle, high), (new_low, _, new_high) = np.concatenate(quantiles, axis=2)
+    return pd.DataFrame(
+        {
+            "time_s": problem.time[real],
+            "force_N": problem.force[real],
+            "deformation_mm": problem.deformation[real],
+            "mean_lo_mm": low,
+            "mean_median_mm": middle,
+            "mean_hi_mm": high,
+            "new_measurement_lo_mm": new_low,
+            "new_measurement_hi_mm": new_high,
+            "usable": posterior.usable,
+        }
+    )
+
+
+@jax.jit
+def _each_motion(problem: DynamicProblem, values):
+    return jax.lax.map(lambda value: predict_motion(problem, value), values)

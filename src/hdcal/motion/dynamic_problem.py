@@ -39,17 +39,11 @@ _ring_mass = jit(ring_mass, static_argnames=("radial_per_read",))
 
 
 class DynamicProblem(Sampled):
-    """Data and priors of the dynamic model.
+    """Data [s, N, mm] and priors, in code units, of the dynamic model.
 
-    Attributes:
-        priors: by site name, in code units; K under the theory of the problem.
-        unit_stiffness: k_theory/E per displacement as read [mm].
-        rise: mean of T − T_ref over the test [K].
-        change: of T from its mean, padded [K]; None where it does not change.
-        time: since the first row [s]; the padding continues the last step.
-        force: on the gear, as read [N]; the padding holds the last value.
-        deformation: as read [mm], padded.
-        count: measured rows.
+    The unit stiffness is k_theory/E per displacement as read [mm], the rise the mean of
+    T − T_ref over the test [K], the change that of T from its mean [K], None where
+    there is none. Rows beyond the count are padding, with later times.
     """
 
     priors: dict[str, Prior]
@@ -81,11 +75,7 @@ def dynamic_site_priors(case: Case, theory: Theory) -> dict[str, Prior]:
 
 
 def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
-    """Return the prior of the moved mass per displacement as read [N·s²/mm].
-
-    Raises:
-        InputError: it follows from the material's density, which is unknown.
-    """
+    """Return the prior of the moved mass per displacement as read [N·s²/mm]."""
     if "mass" in gear.dynamic_priors:
         return gear.dynamic_priors["mass"]
     if gear.theory == SPRING:
@@ -123,10 +113,9 @@ def build_dynamic(
 
 
 def oscillation(problem: DynamicProblem, values: Values) -> dict:
-    """Return stiffness, damping and frequency of sampled values.
+    """Return stiffness at T_ref [N/mm], and others at the mean temperature of the test.
 
-    `stiffness` is at T_ref; `warm_stiffness` [N/mm], `damping` [N·s/mm] and
-    `natural_frequency` [Hz] are at the mean temperature of the test.
+    These are `warm_stiffness` [N/mm], `damping` [N·s/mm] and `natural_frequency` [Hz].
     """
     stiffness = values["K"] * values["E0"] * problem.unit_stiffness
     warm = where_read(values, stiffness) * (1.0 - values["alpha"] * problem.rise)
@@ -179,11 +168,7 @@ def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
 
 
 class DynamicPosterior(Posterior):
-    """A dynamic calibration: draws in code units, priors, checks and provenance.
-
-    It has no offset of the force and no effects: forces are predicted from a
-    calibration at rest.
-    """
+    """A dynamic calibration, without an offset of the force and without effects."""
 
     kind: ClassVar[str] = "dynamic"
 

@@ -1,7 +1,6 @@
 """The motions of many draws of a calibrated gear under one force."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import jax
 import jax.numpy as jnp
@@ -43,10 +42,7 @@ def moving_draws(gears: JointModel, seed: int) -> dict[str, np.ndarray]:
 
 
 def _leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
-    """Return the force of one draw outside base and effects, by the deformation [N].
-
-    It is zero at the unloaded gear; None of a gear that was calibrated in motion.
-    """
+    """Return the force of one draw outside base and effects, zero when unloaded [N]."""
     if _LEFTOVER not in value:
         return None
 
@@ -73,27 +69,19 @@ def integrate_all(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the deformation of every draw, (draw, n), and its largest size [mm].
 
-    Mass [N·s²/mm] and damping [N·s/mm] have one value for each draw of `moving_draws`.
-
     Raises:
         NotUsable: a gear gives way, or a motion could not be integrated.
     """
     case, (kept, _) = gears.posterior.case, acting(without_scatter(gears.effects))
-    about = case_reading(case), temperature, force, times, case.gear.reach
+    settings = case_reading(case), temperature, force, times, case.gear.reach
     count, draws = len(mass), (values, mass, damping)
     size = max(min(_CHUNK, _MOST_STATES // len(times)), 1)
     motion, ends = np.empty((count, len(times))), []
-    # A computation of JAX does not react to an interruption: it runs in a thread.
-    pool = ThreadPoolExecutor(1)
-    try:
-        for first in range(0, count, size):
-            rows = slice(first, first + size)
-            part = jax.tree.map(lambda each, rows=rows: each[rows], draws)
-            found = pool.submit(_computed, part, *about, kept=kept).result()
-            motion[rows] = found[0]
-            ends.append(found[1:])
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    for first in range(0, count, size):
+        rows = slice(first, first + size)
+        part = jax.tree.map(lambda values, rows=rows: values[rows], draws)
+        motion[rows], *end = jax.device_get(_moved(part, *settings, kept=kept))
+        ends.append(end)
     peak, done, gone = map(np.concatenate, zip(*ends, strict=True))
     if gone.any():
         words = f"{np.count_nonzero(gone)} of {count} gears give way under this force"
@@ -105,15 +93,11 @@ def integrate_all(
     return motion, peak
 
 
-def _computed(*given, kept):
-    return jax.device_get(_moved(*given, kept=kept))
-
-
 @jax.jit(static_argnames=("kept",))
 def _moved(draws, reading, at, force, times, reach, *, kept):
     """Return deformation, peak and outcome of each draw."""
 
-    def one(draw):
+    def of_draw(draw):
         value, mass, damping = draw
         effects = tuple(
             effect(**{n: value[f"{effect.name}.{n}"] for n in parameters(effect)})
@@ -126,4 +110,4 @@ def _moved(draws, reading, at, force, times, reach, *, kept):
         motion = integrate(gear, force, times, reach)
         return motion.deformation, motion.largest, motion.done, motion.gone
 
-    return jax.vmap(one)(draws)
+    return jax.vmap(of_draw)(draws)

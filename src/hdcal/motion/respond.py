@@ -65,14 +65,9 @@ class Estimates(Item):
 
 
 class Response(Result):
-    """The motion under a force, with credible bands.
+    """The motion under a force, from the unloaded gear, with pointwise bands.
 
-    Attributes:
-        motion: a row per time: force, ends and median of the pointwise band of the
-            deformation as read from the unloaded gear, and whether it was tested.
-        posterior: of the most probable model.
-        looped: whether the leftover differs between loading and unloading.
-        averaging: sentences about the models that are averaged over.
+    `looped` is whether the leftover differs between loading and unloading.
     """
 
     template = "motion/response.md.j2"
@@ -143,8 +138,7 @@ def respond(
         force: `step`, or a pair of times [s] and forces [N], linear between them.
         amplitude: of a step, of either sign [N].
         duration: of a step [s]; 0.5 by default.
-        temperature: of the gear [°C]; by default the tested one nearest to the
-            reference.
+        temperature: [°C]; by default the tested one nearest to the reference.
         mass: moved mass, if known [N·s²/mm]; 1 kg = 1e-3 N·s²/mm.
         damping: c, if known [N·s/mm].
         points: number of times.
@@ -178,8 +172,9 @@ def respond(
     values = moving_draws(joint(models, draws), seed)
     m, c, k = _coefficients(gears, values, at, given, seed)
     _check_reach(case.gear.reach, drive, times, m, k)
-    about = {"force": drive, "times": times, "temperature": at}
-    deformation, peak = integrate_all(gears, values, m, c, **about)
+    deformation, peak = integrate_all(
+        gears, values, m, c, force=drive, times=times, temperature=at
+    )
     # Quantiles are computed of a copy: part by part it takes little memory.
     parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
     band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
@@ -199,7 +194,7 @@ def respond(
         calibration="moving" if dynamic else "at rest",
         force=drive.words(),
         temperature_C=at,
-        estimates=_estimates(gears.posterior, given, m, c, k, peak),
+        estimates=_estimates(gears, given, m, c, k, peak),
         tested_share=motion.tested.mean(),
         effects=tuple(effect.name for effect in kept),
         left_out=tuple(e.name for e in left if e.stage != "noise"),
@@ -228,17 +223,17 @@ def _force_findings(
     if duration is not None:
         words = "a sampled force has its own duration"
         yield Finding("duration", words, "Leave it out")
-    times, forces = (np.asarray(part, float) for part in force)
+    times, forces, words = *(np.asarray(part, float) for part in force), ""
     if times.shape != forces.shape or times.ndim != 1 or len(times) < 2:
         words = "needs as many times as forces, two or more"
-        yield Finding("force", words, "Correct the table")
     elif wrong := implausible("force", forces) + implausible("force", times, "time"):
         words = f"the table holds {wrong[0].problem}"
-        yield Finding("force", words, "Correct the table")
     elif np.any(np.diff(times) <= 0.0):
-        yield Finding("force", "has times that do not rise", "Put them in order")
+        words = "has times that do not rise"
     elif not np.any(forces):
-        yield Finding("force", "is zero throughout", "Give a force in N")
+        words = "is zero throughout"
+    if words:
+        yield Finding("force", words, "Correct the table")
 
 
 def _coefficients(gears: JointModel, values, at: float, given, seed: int):
@@ -285,18 +280,12 @@ def _tested(gears: JointModel, temperature: float, low, high) -> np.ndarray:
     return inside & conditions.temperature_is_tested(records, temperature)
 
 
-def _estimates(posterior: Posterior, given, m, c, k, peak) -> Estimates:
+def _estimates(gears: JointModel, given, m, c, k, peak) -> Estimates:
     """Return the quantities, and what determines them."""
-    found = {n: one.driven_by for n, one in posterior.diagnoses.items()}
-    by: dict[str, Any] = {"k": found.get("K", "prior")}
-    if posterior.kind == "dynamic":
-        names = {"m": "mass", "c": "damping_ratio"}
-        by |= {n: found.get(name, "prior") for n, name in names.items()}
-    else:
-        names = {"m": "mass", "c": "damping"}
-        by |= {
-            n: "given" if given[v] is not None else "prior" for n, v in names.items()
-        }
+    by: dict[str, Any] = {"k": gears.driver("K"), "m": gears.driver("mass")}
+    by["c"] = gears.driver("damping_ratio")
+    known = {"m": given["mass"], "c": given["damping"]}
+    by |= {name: "given" for name, value in known.items() if value is not None}
     frequency, ratio = natural_frequency(m, k), damping_ratio(m, c, k)
     damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
 

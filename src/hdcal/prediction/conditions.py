@@ -29,22 +29,23 @@ NEAR_K, NEAR_MM = 1.0, 1e-9
 # A deformation this many times the largest that was read is a wrong unit; so is a
 # force this many times larger or smaller than the usual.
 OFF = 100.0
+# Draws that must lie beyond a bound to locate it.
+_BEYOND = 10
+# A rarer case than one in a million rests on the normal law of the scatter alone:
+# no test of this size has readings so far out.
+RAREST = 1e-6
 # A relative change of Young's modulus this large or larger is a wrong unit [-].
 _MOST_LOSS = 0.5
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of n forces.
+    """Conditions of n forces, (n,) each.
 
-    Attributes:
-        deformation: as read, or true for a load [mm], (n,).
-        temperature: of the specimen [°C], (n,).
-        loading: direction of loading, +1 in compression and -1 in tension, (n,).
-        unloading: whether the deformation is reached from a larger one, (n,).
-        quantity: which force.
-        tolerances: ± of the sizes by field of the geometry [mm].
-        factor: stiffness relative to the tested gear's [-], scalar or (n,).
+    The deformation [mm] is as read, or true for a load; the loading is +1 in
+    compression and -1 in tension; unloading is whether the deformation is reached from
+    a larger one. Tolerances are ± of sizes by field of the geometry [mm], the factor is
+    the stiffness relative to the tested gear's, scalar, (n,) or (draw, n).
     """
 
     deformation: np.ndarray
@@ -102,11 +103,7 @@ def beyond_tested(deformation: float, records: Records) -> float:
 
 
 def direction_of_loading(model: JointModel, deformation: float) -> Literal[1, -1]:
-    """Return +1 where the gear is pressed at a deformation, -1 where it is pulled.
-
-    It is the sign of the gear's own deformation, the zero of the gauge taken off, in
-    the larger share of the draws.
-    """
+    """Return +1 where the gear is pressed in most draws, -1 where it is pulled."""
     pressed = np.mean(model.draws["deformation_offset"] <= deformation)
     return 1 if pressed >= 0.5 else -1
 
@@ -123,14 +120,10 @@ def population_findings(asked: str, problem: Problem) -> list[Finding]:
     if asked not in POPULATIONS:
         words = f"'{asked}' is unknown"
         return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
-    what, count = {
-        "readings": ("", 2),
-        "mountings": ("mounting (run)", problem.runs),
-        "specimens": ("gear (specimen)", problem.specimens),
-    }[asked]
-    if count >= 2:
+    counts = {"mountings": problem.runs, "specimens": problem.specimens}
+    if counts.get(asked, 2) >= 2:
         return []
-    words = f"the data hold one {what}, which does not show how much others differ"
+    words = f"the data hold one of the {asked}, which does not show how others differ"
     remedy = f"Measure two or more, or ask about {widest(problem)}"
     return [Finding("population", words, remedy)]
 
@@ -171,11 +164,8 @@ def far_findings(
 ) -> list[Finding]:
     """Return a finding where a deformation can only be in a wrong unit.
 
-    Args:
-        deformation: as given, of either sign [mm].
-        tested: the largest that was read, a size [mm].
-        reach: what no gear of this radius reaches [mm].
-        unit: of all of them.
+    Tested is the largest size that was read, the reach what no gear of this radius
+    reaches, in the same unit.
     """
     if abs(deformation) < reach and abs(deformation) <= tested * OFF:
         return []
@@ -213,3 +203,21 @@ def temperature_findings(
         words = "the linear law E(T) would change Young's modulus by half or more"
         return [Finding("temperature", words, "Give it in °C")]
     return []
+
+
+def share_findings(
+    shares: Mapping[str, float], draws: int, more: str = ""
+) -> list[Finding]:
+    """Return findings for values that are no probabilities or cannot be resolved."""
+    findings = [f for name, value in shares.items() for f in implausible(name, value)]
+    if findings:
+        return findings
+    most = 1.0 - _BEYOND / draws
+    for name, share in shares.items():
+        if name == "confidence" and share > most:
+            words = f"{draws} draws cannot resolve a confidence of {share:g}"
+            findings.append(Finding(name, words, f"Ask for {most:.4g} or less{more}"))
+        elif name != "confidence" and share > 1.0 - RAREST:
+            words = f"{share:.12g} is beyond what a model of the scatter can promise"
+            findings.append(Finding(name, words, f"Ask for {1.0 - RAREST:g} or less"))
+    return findings

@@ -36,18 +36,11 @@ LEAST_NOISE, LEAST_RANGE = 1e-6, 1e-9
 
 @dataclass(frozen=True)
 class Bend:
-    """The bend towards and beyond one end of the tested deformation.
+    """The bend that grows from the far end of the tested deformation to and beyond one.
 
-    Attributes:
-        end: towards which it grows [mm].
-        far: the other end [mm].
-        knots: places with residuals, 0 at the far end and 1 at the end, (k,).
-        line: weights of the residuals in the line of offset and stiffness, (2, k).
-        axes: directions of the residuals that no line absorbs, (k, m).
-        found: the residuals along these directions [N], (m,).
-        size: of the bend under each law [N], (g,).
-        variance: along each direction under each law [N²], (m, g).
-        chances: probability of each law, (g,).
+    Residuals are at k knots, 0 at the far end and 1 at the end. The line has the weight
+    of each in offset and stiffness, (2, k); along m axes no line absorbs them, (k, m):
+    there they are `found` [N], (m,), with a variance under each of g laws [N²], (m, g).
     """
 
     end: float
@@ -65,10 +58,7 @@ class Bend:
         return (np.asarray(deformation) - self.far) / (self.end - self.far)
 
     def beyond(self, deformation: np.ndarray) -> np.ndarray:
-        """Return the share of the bend that acts beside a fitted leftover [-].
-
-        The leftover covers the tested range, and the bend replaces it beyond the end.
-        """
+        """Return the share of a fitted leftover that the bend replaces [-]."""
         over = np.maximum(self.place(deformation) - 1.0, 0.0) / FADE
         return -np.expm1(-(over**2))
 
@@ -89,10 +79,7 @@ class Bend:
     def of_draws(
         self, deformation: np.ndarray, level: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and sd of the bend of each draw [N], (d, n) each.
-
-        A level between 0 and 1 selects the law of a draw by its probability, (d,).
-        """
+        """Return mean and sd of the bend of each draw [N], (d, n), by a level, (d,)."""
         mean, sd = self.law(deformation)
         law = np.searchsorted(np.cumsum(self.chances)[:-1], level)
         return mean[law], sd[law]

@@ -29,10 +29,9 @@ _STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"forc
 
 
 def grid_records(deformation, temperature, sense, known_sd, gear=None) -> Records:
-    """Return rows that were not measured: immediate readings after a reset.
+    """Return immediate readings after a reset, (n,), that were not measured.
 
-    Deformation as read [mm], temperature [°C], sense of the movement (±1): (n,). Each
-    row is of a gear of its own, without memory of other rows, unless `gear` numbers
+    Each is of a gear of its own, without memory of other rows, unless `gear` numbers
     them.
     """
     zeros = np.zeros(len(deformation))
@@ -64,16 +63,11 @@ def force_of(
 ) -> tuple[Float[Array, " n"], Noise]:
     """Compute mean force and noise [N] of one draw, without the leftover discrepancy.
 
-    Args:
-        problem: structure.
-        values: parameters of one draw.
-        records: from `grid_records`; for a load or a gear at true deformations and
-            temperatures, without the errors of the gauges.
-        factor: stiffness relative to the tested gear's [-].
-        moved: radial deformation that a warmer frame gains [mm].
-        quantity: `reading` has the zero of the force and the effects of the sensor;
-            `load` lacks them and the gain of the gauge; `gear` also lacks the zero of
-            the deformation and the compliance of the rig.
+    The factor is the stiffness relative to the tested gear's, `moved` the radial
+    deformation that a warmer frame gains [mm]. A `reading` has the zero of the force
+    and the effects of the sensor; a `load`, at true deformation and temperature, lacks
+    them and the gain of the gauge; a `gear` also lacks the zero of the deformation and
+    the compliance of the rig.
     """
     effects = build_effects(problem, values)
     base = member_base(problem, values)
@@ -105,15 +99,8 @@ def forces_of_draws(
 ):
     """Compute the force of every draw, its slope by the stiffness, and the noise.
 
-    Args:
-        problem: structure.
-        draws: parameters by site: [draw, …].
-        path: rows that lead to the conditions, which are the last ones.
-        factor: on the stiffness at each row of the path [-].
-        moved: radial deformation that the frame gains at each row [mm].
-        leftover: share of the fitted leftover discrepancy that acts.
-        quantity: which force.
-        asked: number of conditions.
+    The last rows of the path are the conditions asked for. Factor and `moved` are as in
+    `force_of`; the leftover is the share of the fitted discrepancy that acts.
 
     Returns:
         Force (draw, node, asked) and its derivative by the factor [N], logarithms of

@@ -29,11 +29,9 @@ DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"
 
 @dataclass(frozen=True)
 class JointModel:
-    """Models of one case as one model with all their effects.
+    """Models of one case, the most probable first, as one with all their effects.
 
-    Attributes:
-        models: the most probable first.
-        rows: of each model the draws that are taken.
+    Of each model some rows of its draws are taken.
     """
 
     models: tuple[Model, ...]
@@ -58,16 +56,19 @@ class JointModel:
         if len(self.models) == 1:
             return self.posterior.problem
         structures = [model.posterior.structure for model in self.models]
-        with_gap = any(one.with_gap for one in structures)
+        with_gap = any(structure.with_gap for structure in structures)
         priors = {
             name: prior
             for model in reversed(self.models)
             for name, prior in model.posterior.priors.items()
         }
-        structure = replace(structures[0], with_gap=with_gap)
-        case, theory = self.posterior.case, self.posterior.theory
-        given = {"theory": theory, "structure": structure}
-        return build_problem(case, priors, self.effects, **given)
+        return build_problem(
+            self.posterior.case,
+            priors,
+            self.effects,
+            theory=self.posterior.theory,
+            structure=replace(structures[0], with_gap=with_gap),
+        )
 
     @property
     def size(self) -> int:
@@ -110,16 +111,15 @@ class JointModel:
     def bend(self, place: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return mean and sd of the bend of each draw by its model [N], (draw, row).
 
-        Args:
-            place: deformation as read [mm], (row,).
-            level: selects a law of the bend by its probability, (draw,).
+        The place is the deformation as read [mm], (row,); the level, (draw,), selects a
+        law of the bend by its probability.
         """
         ends = np.cumsum([len(rows) for rows in self.rows])[:-1]
         parts = [
             model.bend(place, part)
             for model, part in zip(self.models, np.split(level, ends), strict=True)
         ]
-        return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
+        return tuple(map(np.concatenate, zip(*parts, strict=True)))
 
     @cached_property
     def drifts(self) -> dict[str, np.ndarray]:
@@ -132,13 +132,12 @@ class JointModel:
         stroke = max(case.gear.full_scale.deformation, REFERENCE.deformation)
         priors = effect_priors(replace(case.gear.full_scale, deformation=stroke))
         priors |= case.gear.effect_priors
-        found = {}
+        drifts = {}
         for name, effect in DRIFTS.items():
+            lacking = np.array([effect not in model.effects for model in self.models])
             law = np.array(moments(priors[f"{effect}.slope"]))
-            names = [[e.name for e in m.posterior.effects] for m in self.models]
-            lacking = np.array([effect not in each for each in names])
-            found[name] = law[:, None] * lacking[self.number]
-        return found
+            drifts[name] = law[:, None] * lacking[self.number]
+        return drifts
 
     @property
     def independent_draws(self) -> float:
@@ -149,31 +148,25 @@ class JointModel:
 
     def driver(self, site: str) -> Literal["data", "prior"]:
         """Return whether the data or the prior determine a parameter."""
-        found = self.posterior.diagnoses.get(site)
-        return "data" if found is not None and found.driven_by == "data" else "prior"
+        diagnosis = self.posterior.diagnoses.get(site)
+        return "prior" if diagnosis is None else diagnosis.driven_by
 
     def take(self, places: np.ndarray) -> "JointModel":
         """Return some of the draws, by ascending places."""
         number, rows = self.number[places], np.concatenate(self.rows)[places]
-        each = tuple(rows[number == model] for model in range(len(self.models)))
-        return replace(self, rows=each)
+        parts = tuple(rows[number == model] for model in range(len(self.models)))
+        return replace(self, rows=parts)
 
 
 def joint(
     models: Models, most: int | None = None, *, allow_failed: bool = False
 ) -> JointModel:
-    """Return models as one.
-
-    Args:
-        models: as in `models_of`, which raises its errors.
-        most: draws to take, evenly from every chain; all by default.
-        allow_failed: also calibrations that failed their checks.
-    """
+    """Return models as one, with at most so many draws; see `models_of` for errors."""
     return join(models_of(models, allow_failed=allow_failed), most)
 
 
 def join(models: Sequence[Model], most: int | None = None) -> JointModel:
-    """Return models as one; their probabilities may have any sum."""
+    """Return models as one; draws are taken evenly, probabilities may have any sum."""
     total = sum(model.probability for model in models)
     whole = min(model.size * total / model.probability for model in models)
     size = min(whole, most or np.inf)

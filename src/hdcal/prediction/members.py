@@ -16,15 +16,10 @@ class Members:
     """Forces of the members at n conditions, along the direction of loading.
 
     What is unknown but the same for all members (parameters, centre of the population,
-    bend, drift of the rig) has one value in each draw. What differs from member to
-    member (gear, mounting, sizes, noise) has normal components within each draw.
-
-    Attributes:
-        share: of each component within its draw, (draw, component).
-        mean: of the components [N], (draw, row, component).
-        sd: of the components [N], (draw, row, component).
-        scatter: variance between members by source [N²], (draw, row).
-        common: inputs that all members share, (draw, row).
+    bend, drift of the rig) has one value in each draw, (draw, row): `common`. What
+    differs from member to member (gear, mounting, sizes, noise) has normal components
+    within each draw: share (draw, component), mean and sd [N] (draw, row, component);
+    `scatter` is their variance by source [N²], (draw, row).
     """
 
     share: np.ndarray
@@ -35,13 +30,13 @@ class Members:
 
     def row(self, place: int) -> "Members":
         """Return the members at one of the conditions."""
-        one = slice(place, place + 1)
+        row = slice(place, place + 1)
         return Members(
             self.share,
-            self.mean[:, one],
-            self.sd[:, one],
-            {name: value[:, one] for name, value in self.scatter.items()},
-            {name: value[:, one] for name, value in self.common.items()},
+            self.mean[:, row],
+            self.sd[:, row],
+            {name: value[:, row] for name, value in self.scatter.items()},
+            {name: value[:, row] for name, value in self.common.items()},
         )
 
     @property
@@ -55,13 +50,9 @@ class Members:
         return np.einsum("dk,drk->dr", self.share, tail)
 
     def quantile(self, level: np.ndarray | float) -> np.ndarray:
-        """Return the force that a share of the members does not exceed [N].
+        """Return the force that a share of the members does not exceed, (draw, row).
 
-        Args:
-            level: the share, one for all draws or (draw,).
-
-        Returns:
-            Shape (draw, row).
+        The level is that share, one for all draws or (draw,).
         """
         draws, rows, components = self.mean.shape
         level = np.broadcast_to(np.reshape(level, (-1, 1)), (draws, rows))

@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from hdcal.errors import Finding, InputError
-from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.extrapolation import Bend, fit_bends
@@ -21,7 +20,7 @@ _ROUNDING = 1e-6
 
 
 class Averaged(Protocol):
-    """Calibrated models with their probabilities, as a diagnosis holds them."""
+    """A diagnosis, or another average of calibrated models."""
 
     @property
     def posteriors(self) -> Mapping[str, tuple[float, Posterior]]:
@@ -39,10 +38,10 @@ class Model:
     probability: float
     posterior: Posterior
 
-    @cached_property
-    def problem(self) -> Problem:
-        """Structure of the model."""
-        return self.posterior.problem
+    @property
+    def effects(self) -> list[str]:
+        """Names of the effects, in order."""
+        return sorted(effect.name for effect in self.posterior.effects)
 
     @cached_property
     def draws(self) -> dict[str, np.ndarray]:
@@ -58,9 +57,8 @@ class Model:
     @property
     def name(self) -> str:
         """Name among the hypotheses of a diagnosis."""
-        effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
-        rest = UNKNOWN if self.problem.discrepancy is not None else ""
-        return "+".join(filter(None, (effects, rest))) or NONE
+        rest = [] if self.posterior.problem.discrepancy is None else [UNKNOWN]
+        return "+".join([*self.effects, *rest]) or NONE
 
     @cached_property
     def bends(self) -> tuple[Bend, Bend]:
@@ -70,12 +68,9 @@ class Model:
     def bend(self, place: np.ndarray, level: np.ndarray):
         """Return mean and sd of the bend of each draw [N], (draw, row) each.
 
-        Inside the tested range both bends describe the same residuals, each best near
-        its end. A fitted leftover covers that range: beside it the bend acts beyond.
-
-        Args:
-            place: deformation as read [mm], (row,).
-            level: selects a law of the bend by its probability, (draw,).
+        As `JointModel.bend`. Inside the tested range both bends describe the same
+        residuals, each best near its end. A fitted leftover covers that range: beside
+        it the bend acts beyond.
         """
         below, above = self.bends
         upper = np.clip(above.place(place), 0.0, 1.0)
@@ -96,16 +91,12 @@ class Model:
     @property
     def independent_draws(self) -> float:
         """Effective number of draws in the tails of the parameters."""
-        sizes = [found.ess_tail for found in self.posterior.diagnoses.values()]
+        sizes = [diagnosis.ess_tail for diagnosis in self.posterior.diagnoses.values()]
         return min([self.size, *(size for size in sizes if np.isfinite(size))])
 
 
 def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
-    """Return models with their probabilities as they were given.
-
-    Raises:
-        InputError: it is no calibrated model, or a diagnosis without any.
-    """
+    """Return models with their probabilities, or refuse what is none."""
     if isinstance(models, Posterior):
         return [(1.0, models)]
     if isinstance(models, list | tuple):
@@ -113,14 +104,11 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
             return models
         words, remedy = "are no pairs", "Give [(0.6, posterior), (0.4, other)]"
         raise InputError([Finding("models", words, remedy)])
-    held = getattr(models, "posteriors", None)
-    if held:
+    if held := getattr(models, "posteriors", None):
         return list(held.values())
     words = f"{type(models).__name__} is no calibrated model"
-    remedy = "Give what calibrate or diagnose returned, itself"
-    if held is not None:
-        words += " and a quick diagnosis holds none"
-        remedy += "; diagnose without quick"
+    words += ", and a quick diagnosis holds none"
+    remedy = "Give a calibration, or a diagnosis that was not quick"
     # A fleet, or its posterior.
     if hasattr(models, "margin"):
         remedy = "Use its method `margin`"
@@ -130,10 +118,7 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
 def models_of(models: Models, *, allow_failed: bool = False) -> tuple[Model, ...]:
     """Return models, the most probable first, with probabilities that sum to 1.
 
-    Args:
-        models: a posterior, several with the probabilities of their models, a model
-            average, or a diagnosis.
-        allow_failed: also calibrations that failed their checks.
+    Models that failed their checks are an error unless allowed.
 
     Raises:
         NotUsable: a calibration failed its checks.
@@ -170,10 +155,10 @@ def left_out_of(models: Models) -> float:
 
 def averaging_words(models: Models) -> list[str]:
     """Return sentences on the hypotheses of an average and on those left out."""
-    found, sentences = models_of(models, allow_failed=True), []
-    if len(found) > 1:
-        each = probabilities(found).items()
-        listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in each)
+    every, sentences = models_of(models, allow_failed=True), []
+    if len(every) > 1:
+        shares = probabilities(every).items()
+        listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in shares)
         sentences.append(f"This averages over the causes that are left: {listed}.")
     missing: LeftOut | None = getattr(models, "left_out", None)
     if missing is not None and missing.probability > _ROUNDING:

@@ -36,12 +36,9 @@ def simulate(
 ) -> Members:
     """Return the forces of the members of a population in every draw.
 
-    Args:
-        model: whose draws are simulated.
-        at: conditions of the forces.
-        population: members that differ from each other: readings of the tested gear and
-            mounting, new mountings, or new gears (`specimens`) in new mountings.
-        seed: of the scores of what the draws leave open.
+    Members that differ from each other are readings of the tested gear and mounting,
+    new mountings, or new gears (`specimens`) in new mountings. The seed is that of the
+    scores of what the draws leave open.
     """
     problem, draws, count = model.problem, model.draws, model.size
     reading, score = at.quantity == "reading", draw_scores(model.size, seed)
@@ -102,8 +99,7 @@ def gear_forces(model: JointModel, at: Conditions, *, seed: int = 0) -> np.ndarr
     """Return the force of every draw on gears by themselves [N], (draw, row).
 
     Each row is another gear, loaded from its free shape, without zeros, errors and
-    drifts of a rig. A factor on the stiffness, where sizes are not the tested ones, is
-    (row,) or (draw, row).
+    drifts of a rig.
     """
     bend, acting = _bend(model, at, draw_scores(model.size, seed))
     factor = np.broadcast_to(at.factor, (model.size, at.size))[:, None]
@@ -139,7 +135,7 @@ def _forces(
     """Return what `forces_of_draws` does."""
     path = _path(at, model.posterior.case.records)
     repeats = len(path.deformation) // at.size
-    found = forces_of_draws(
+    forces = forces_of_draws(
         model.problem,
         model.draws,
         path,
@@ -149,14 +145,11 @@ def _forces(
         quantity=at.quantity,
         asked=at.size,
     )
-    return tuple(map(np.asarray, found))
+    return tuple(map(np.asarray, forces))
 
 
 def _path(at: Conditions, records: Records) -> Records:
-    """Return the rows by which the conditions are reached, each in a gear of its own.
-
-    Unloading begins at the largest tested deformation, or here where that is larger.
-    """
+    """Return the rows that lead to the conditions, each in a gear of its own."""
     sd = usual_sd(records)
     if not at.unloading.any():
         return grid_records(at.deformation, at.temperature, at.movement, sd)
@@ -172,10 +165,7 @@ def _path(at: Conditions, records: Records) -> Records:
 
 @lru_cache(maxsize=8)
 def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
-    """Return scores of each draw by Latin hypercube sampling.
-
-    Standard normal, but for `law`, which lies between 0 and 1.
-    """
+    """Return SCORES of each draw by Latin hypercube sampling."""
     rng, even = np.random.default_rng(seed), (np.arange(count) + 0.5) / count
     levels = {name: rng.permutation(even) for name in SCORES}
     return {n: level if n == "law" else ndtri(level) for n, level in levels.items()}
@@ -205,10 +195,7 @@ def _bend(model: JointModel, at: Conditions, score) -> tuple[np.ndarray, np.ndar
 
 
 def _drifts(model: JointModel, at: Conditions, score) -> dict[str, np.ndarray]:
-    """Return the drift of the gauge's zero [N] and of the frame [mm], (draw, row).
-
-    They act on a reading outside the tested temperatures.
-    """
+    """Return the drift of zero [N] and frame [mm] outside the tested temperatures."""
     warm = model.posterior.case.records.temperature
     kelvins = at.temperature - np.clip(at.temperature, np.min(warm), np.max(warm))
     if at.quantity != "reading" or not kelvins.any():
@@ -220,10 +207,7 @@ def _drifts(model: JointModel, at: Conditions, score) -> dict[str, np.ndarray]:
 
 
 def _of_sizes(model: JointModel, at: Conditions, force, node_share) -> dict:
-    """Return the variance by the tolerance of each size [N²], (draw, row) each.
-
-    The variance by all sizes together is divided as each alone would make it.
-    """
+    """Return the variance by each tolerance [N²], (draw, row), together that of all."""
     if not at.tolerances:
         return {}
     posterior = model.posterior

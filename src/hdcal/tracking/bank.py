@@ -11,7 +11,7 @@ become (y_t − ρ y_(t−1)) / √(1 − ρ²), their columns likewise.
 """
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -21,7 +21,6 @@ from jax.scipy.special import logsumexp, ndtr, ndtri
 from jaxtyping import Float, Int
 
 from hdcal.tracking.change_alarm import step_sums
-from hdcal.tracking.draw_forces import RowForces
 
 STIFFNESS, ZERO = 0, 1
 # A correlation closer to one could not be distinguished from a shift of the zero.
@@ -42,20 +41,31 @@ FIELDS = (
 )
 
 
-class Bank(eqx.Module):
-    """Knowledge after some rows, and what stays as it is over a stream.
+class RowForces(NamedTuple):
+    """Readings that draws expect at rows [N]; the slope is by the relative stiffness.
 
-    Attributes:
-        mean, covariance: of the coefficients; the covariance over the noise variance.
-        shape, rate: of the noise variance [-] and [N²].
-        log_weight: of each draw.
-        columns, reading: of the row before, less what is fixed in each draw.
-        products: sums of products of neighbouring residuals and of squares.
-        sums, threshold: of the change alarm, above and below.
-        counts, epoch: readings in each cell of the force; when counts start again.
-        stiffness, variance: as read [N/mm]; of a reading without load at first [N²].
-        step: of the force as read [N], 0 = not rounded.
-        remounting: variance of the zero from one mounting to the next [N²].
+    The excess is the variance of a reading beyond that of one without load [N²]; the
+    extrapolation the sd of the error at untested conditions, with the sign of the side
+    on which these lie; the columns are those of the coefficients of the leftover.
+    """
+
+    mean: Float[Array, "n draw"]
+    slope: Float[Array, "n draw"]
+    excess: Float[Array, "n draw"]
+    extrapolation: Float[Array, "n draw"]
+    columns: Float[Array, "n draw c"]
+
+
+class Bank(eqx.Module):
+    """Knowledge after some rows, and what is constant over a stream.
+
+    The covariance of the coefficients is relative to the noise variance, which has a
+    shape and a rate [N²]. Columns and reading are those of the row before, products the
+    sums of products of neighbouring residuals and of squares. Counts are of the
+    readings in each cell of the force [N]; each epoch has other cells. The stiffness is
+    as read [N/mm], the variance that of a reading without load at first [N²], the step
+    that of the force, 0 if not rounded, and remounting the variance of the zero from
+    one mounting to the next [N²].
     """
 
     mean: Float[Array, "draw p"]
@@ -112,12 +122,9 @@ class Bank(eqx.Module):
 def follow_rows(bank: Bank, rows: dict[str, Any], count: int):
     """Take rows in their order; return the bank after them, and FIELDS of each row.
 
-    Args:
-        bank: before the rows.
-        rows: the `force` as read [N], the `forces` that the draws expect; whether a row
-            `follows` the one before, so that their noise may be correlated, and is
-            `remounted`; the `cell` of its force. Each has the rows as its first axis.
-        count: of the rows; others are padding.
+    Rows have the `force` as read [N], the `forces` that the draws expect, whether a row
+    `follows` the one before, so that their noise may be correlated, and is `remounted`,
+    and the `cell` of its force. Those after the count are padding.
     """
 
     def step(i, carry):
@@ -187,8 +194,8 @@ def _unknowns(bank: Bank, forces: RowForces):
 def _normal_score(bank: Bank, t, freedom):
     """Return the normal score of a reading in a mixture of Student distributions.
 
-    By the transformation of Wallace (Annals of Mathematical Statistics 30, 1959), with
-    an error below 0.02 from some three degrees of freedom on.
+    By Wallace (Annals of Mathematical Statistics 30, 1959), to 0.02 from some three
+    degrees of freedom on.
     """
     z = jnp.sqrt(freedom * jnp.log1p(t**2 / freedom))
     z = jnp.sign(t) * z * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)
@@ -210,13 +217,12 @@ def _products(before: Bank, after: Bank):
 
 
 def _rounding_weight(bank: Bank, cell):
-    """Return what a coarsely rounded reading adds, as a share of a reading.
+    """Return the weight of a coarsely rounded reading, its repeated share, the counts.
 
     With noise of sd σ below half of the step q an error of rounding repeats with the
-    force, with variance q²/12 exp(−4π² σ²/q²) (first harmonic of the error). Then k
-    readings of a force say as much as one of variance b² + s²/k, where b² + s² is the
-    variance of a reading. Also returned: the part b² of the variance, and the new
-    counts.
+    force, with variance b² = q²/12 exp(−4π² σ²/q²) (first harmonic of the error). Then
+    k readings of a force are worth one of variance b² + s²/k, where b² + s² is the
+    variance of a reading.
     """
     if bank.counts.size == 0:
         return jnp.ones(()), jnp.zeros(()), bank.counts

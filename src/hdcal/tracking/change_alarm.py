@@ -19,12 +19,8 @@ def run_length(threshold: float, shift: float = 0.0) -> float:
     """Return the mean number of rows until a one-sided CUSUM from zero passes h.
 
     Solves L(u) = 1 + L(0) Φ(k − u) + ∫₀ʰ L(v) φ(v + k − u) dv, with k the allowance
-    less the shift, by Gauss-Legendre quadrature. For this smooth kernel that is exact
-    to rounding (Page, Biometrika 41, 1954).
-
-    Args:
-        threshold: h [-].
-        shift: mean of the innovations [-].
+    less the shift (mean of the innovations), by Gauss-Legendre quadrature. For this
+    smooth kernel that is exact to rounding (Page, Biometrika 41, 1954).
     """
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     at = np.append(0.0, 0.5 * threshold * (nodes + 1.0))

@@ -25,8 +25,7 @@ def track(console: Console, known, alarm_rows):
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
     "force_N": 37.8}, optionally with temperature_C and run (a label of the mounting).
-    The input may also be CSV with a header such as deformation_mm,force_N. Each reading
-    is answered at once by a line on standard output.
+    Each reading is answered at once by a line on standard output.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.tracking.stream import answer_lines

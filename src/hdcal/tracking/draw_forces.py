@@ -1,25 +1,25 @@
-"""The readings that posterior draws expect at rows of a stream."""
+"""The readings that draws expect at rows of a stream, and the bank before the first."""
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from scipy.special import digamma
 
-from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import Discrepancy
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.residuals import noise_warnings
+from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.force_model.values import Values, as_read
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.prediction.joint import DRIFTS, JointModel, join
 from hdcal.prediction.models import Models, averaging_words, models_of
 from hdcal.prediction.simulate import draw_scores
+from hdcal.tracking.bank import CELLS, Bank, RowForces
 
 # At least this much probability must lie on models that a stream can follow.
 _LEAST_FOLLOWED = 0.5
@@ -27,37 +27,24 @@ _LEAST_FOLLOWED = 0.5
 _SMALL = 0.03
 # Site of the sd of the zero from one mounting to the next [N].
 MOUNTING = "run_offset_sd"
-
-
-class RowForces(NamedTuple):
-    """Readings that draws expect at rows.
-
-    Attributes:
-        mean: reading [N].
-        slope: its derivative by the stiffness, relative to that of the draw [N].
-        excess: variance of a reading beyond that of one without load [N²].
-        extrapolation: sd of the error at untested conditions, with the sign of the side
-            on which these lie [N].
-        columns: of the coefficients of the leftover discrepancy [N].
-    """
-
-    mean: Float[Array, "n draw"]
-    slope: Float[Array, "n draw"]
-    excess: Float[Array, "n draw"]
-    extrapolation: Float[Array, "n draw"]
-    columns: Float[Array, "n draw c"]
+# Draws of the bank.
+_DRAWS = 128
+# Draws per coefficient that a regression needs, and fewest draws of a model.
+_PER_COEFFICIENT = 10
+# Largest variance of log σ² within a draw: a conjugate prior ties the width of the
+# coefficients to the noise, and a lucky first reading would say that there is little.
+_MOST_WITHIN = 0.1
+# Pairs of neighbours that the correlation of a calibration counts for.
+_PAIRS = 30.0
 
 
 @dataclass(frozen=True)
 class StreamDraws:
-    """Draws of the models of a case that a stream can follow.
+    """Draws of the models of a case that a stream can follow, joined.
 
-    Attributes:
-        model: the models as one.
-        values: parameters by site, [draw, …]; of a leftover discrepancy the mean.
-        scores: coefficients of the leftover discrepancy, of unit variance, (draw, c).
-        parts: weights that belong to each of these, shape (weight, c).
-        bend: level of its law and normal score of each draw, (draw, 2).
+    The weights of a leftover discrepancy among the values are their mean; scores of
+    unit variance (draw, c) times parts (weight, c) are the distances from it. The bend
+    of each draw has the level of its law and a normal score, (draw, 2).
     """
 
     model: JointModel
@@ -197,3 +184,77 @@ def _force(
     excess = excess + jnp.sum(loop**2, axis=1)
     columns = fitted * (middle @ parts)
     return RowForces(mean + middle @ weights, slope, excess, drift, columns)
+
+
+def first_bank(every: StreamDraws, threshold: float) -> tuple[StreamDraws, Bank]:
+    """Return some of the draws, and what they know of a stream."""
+    number, problem = every.model.number, every.model.problem
+    rows = np.flatnonzero(np.bincount(number)[number] >= _PER_COEFFICIENT)
+    rows = rows[np.linspace(0, len(rows) - 1, _DRAWS).astype(int)]
+    draws = every.take(rows)
+    mean, covariance = _coefficients(every, rows)
+    new = 1.0 + 1.0 / (problem.runs or 1), 1.0 + 1.0 / (problem.specimens or 1)
+    covariance[:, 1, 1] += new[0] * draws.values[MOUNTING] ** 2
+    covariance[:, 0, 0] += new[1] * draws.values.get("specimen_sd", 0.0) ** 2
+    logs = np.log(every.variance)
+    logs -= (np.bincount(number, logs) / np.maximum(np.bincount(number), 1))[number]
+    spread = max(float(np.var(logs)), 1e-8)
+    within = min(spread, _MOST_WITHIN)
+    # ψ′(shape) = within, to its second order.
+    shape = 0.5 * (1.0 + np.sqrt(1.0 + 2.0 * within)) / within
+    # What is not within is between the draws.
+    moved = (np.sqrt(1.0 - within / spread) - 1.0) * logs[rows]
+    rate = draws.variance * np.exp(moved + digamma(shape))
+    step, rho = float(problem.step), np.mean(every.values.get(CORRELATION, 0.0))
+    state = {
+        "mean": mean,
+        "covariance": covariance / (rate / (shape - 1.0))[:, None, None],
+        "shape": shape,
+        "rate": rate,
+        "log_weight": np.full(_DRAWS, -np.log(_DRAWS)),
+        "columns": np.zeros_like(mean),
+        "reading": np.zeros(_DRAWS),
+        "products": _PAIRS * np.array([rho, 1.0]),
+        "sums": np.zeros(2),
+        "counts": np.zeros(CELLS if step else 0),
+        "stiffness": draws.stiffness,
+        "variance": rate / shape,
+        "step": step,
+        "remounting": 2.0 * np.mean(every.values[MOUNTING] ** 2),
+        "threshold": threshold,
+    }
+    arrays = {name: jnp.asarray(value, float) for name, value in state.items()}
+    return draws, Bank(**arrays, epoch=jnp.zeros((), int))
+
+
+def _coefficients(
+    every: StreamDraws, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and covariance of the coefficients given the shape of each draw.
+
+    By linear regression within each model on the values that shape the curve. The last
+    two coefficients are of untested conditions, independent and of unit variance.
+    """
+    values, stiffness = every.values, every.stiffness
+    names = ["alpha", "deformation_offset", *(n for n in values if "." in n)]
+    shapes = np.stack([values[name] for name in names], axis=1)
+    target = np.column_stack([stiffness, values["force_offset"], every.scores])
+    size = target.shape[1]
+    mean = np.zeros((_DRAWS, size + 2))
+    covariance = np.tile(np.eye(size + 2), (_DRAWS, 1, 1))
+    number = every.model.number
+    for model in np.unique(number[rows]):
+        of, here = number == model, number[rows] == model
+        about = shapes - shapes[of].mean(axis=0)
+        left = target[of] - target[of].mean(axis=0)
+        slope, _, rank, _ = np.linalg.lstsq(about[of], left, rcond=1e-10)
+        if len(left) < _PER_COEFFICIENT * (size + rank):
+            slope, rank = np.zeros_like(slope), 0
+        left = left - about[of] @ slope
+        mean[here, :size] = target[of].mean(axis=0) + about[rows[here]] @ slope
+        covariance[here, :size, :size] = left.T @ left / (len(left) - 1 - rank)
+    # Stiffness relative to that of the draw, zero from that of the draw.
+    mean[:, 1] -= values["force_offset"][rows]
+    unit = np.ones_like(mean)
+    unit[:, 0] = 1.0 / stiffness[rows]
+    return mean * unit, covariance * unit[:, :, None] * unit[:, None, :]

@@ -14,8 +14,7 @@ from hdcal.prediction.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.models import Models
 from hdcal.tracking.bank import CELL, FIELDS, follow_rows
 from hdcal.tracking.change_alarm import threshold_for
-from hdcal.tracking.draw_forces import draws_of
-from hdcal.tracking.first_bank import first_bank
+from hdcal.tracking.draw_forces import draws_of, first_bank
 
 SCHEMA = "hdcal.track/1"
 # Rows that one compiled program takes, beside a single one.
@@ -32,13 +31,10 @@ def _number(name: str, **more: Any) -> Any:
 
 
 class StreamReading(BaseModel):
-    """A reading of a stream.
+    """Deformation [mm] and force [N] as read, and the temperature of the specimen [°C].
 
-    Attributes:
-        deformation: as read [mm].
-        force: as read [N].
-        temperature: of the specimen [°C]; None for the reference temperature.
-        run: label of the mounting; with another one the zero may have moved.
+    Without a temperature it is the reference temperature. With another label of the
+    run, the mounting, the zero may have moved.
     """
 
     model_config = ConfigDict(
@@ -61,12 +57,9 @@ class Tracker:
         alarm_rows: mean number of readings between false alarms, 10 to 10⁹.
 
     Attributes:
-        units: names and units of what is read.
         notes: sentences on the models.
         stiffness: at the start, mean and half-width of its 95 % interval [N/mm].
-        rows: number of rows so far.
-        readings: number of rows that were readings.
-        alarms: number of alarms so far.
+        rows, readings, alarms: numbers of rows, of readings among them, and of alarms.
 
     Raises:
         NotUsable: the calibration failed its checks.
@@ -93,27 +86,16 @@ class Tracker:
         self.rows = self.readings = self.alarms = 0
 
     def update(self, deformation: float, force: float, **more) -> dict[str, Any]:
-        """Take one reading; its fields are those of `StreamReading`.
-
-        Returns:
-            A line of `hdcal track`, as plain data.
+        """Take one reading of `StreamReading`; return a line of `hdcal track`.
 
         Raises:
             ValueError: a number is missing or implausible; nothing was learned.
         """
-        return self.follow(
-            [StreamReading(deformation=deformation, force=force, **more)]
-        )[0]
+        reading = StreamReading(deformation=deformation, force=force, **more)
+        return self.follow([reading])[0]
 
     def follow(self, readings: Sequence[StreamReading | str]) -> list[dict[str, Any]]:
-        """Take readings in their order, which is faster than one by one.
-
-        Args:
-            readings: each a reading, or why a line is none.
-
-        Returns:
-            A line of `hdcal track` for each, as plain data.
-        """
+        """Take readings in their order, or why a line is none; return as `update`."""
         answers, good, rows = [], [], []
         for reading in readings:
             self.rows += 1
@@ -125,8 +107,8 @@ class Tracker:
                 rows.append(self._as_row(reading))
         for first in range(0, len(rows), _BLOCK):
             block = slice(first, first + _BLOCK)
-            found = self._found(np.array(rows[block]))
-            for answer, line in zip(good[block], found, strict=True):
+            lines = self._fields(np.array(rows[block]))
+            for answer, line in zip(good[block], lines, strict=True):
                 self._fill(answer, line)
         return answers
 
@@ -139,7 +121,7 @@ class Tracker:
         warm = self._reference if warm is None else warm
         return reading.deformation, warm, reading.force, follows, remounted
 
-    def _found(self, rows: np.ndarray) -> list[dict[str, float]]:
+    def _fields(self, rows: np.ndarray) -> list[dict[str, float]]:
         """Return FIELDS, half-width of an interval in scales, and tested, of rows."""
         count = len(rows)
         where = rows[:, :2]
@@ -152,41 +134,39 @@ class Tracker:
         cell = np.round(np.asarray(forces.mean).mean(axis=1) / width).astype(int)
         inputs = {"force": force, "forces": forces, "cell": cell}
         inputs |= {"follows": follows > 0.0, "remounted": remounted > 0.0}
-        self._bank, found = follow_rows(self._bank, inputs, count)
-        found = np.asarray(found)[:count]
-        half = stdtrit(found[:, FIELDS.index("freedom")], 0.975)
-        names = (*FIELDS, "half", "tested")
-        lines = np.column_stack([found, half, tested]).tolist()
-        return [dict(zip(names, line, strict=True)) for line in lines]
+        self._bank, lines = follow_rows(self._bank, inputs, count)
+        lines = np.asarray(lines)[:count]
+        half = stdtrit(lines[:, FIELDS.index("freedom")], 0.975)
+        names, lines = (*FIELDS, "half", "tested"), np.c_[lines, half, tested]
+        return [dict(zip(names, line, strict=True)) for line in lines.tolist()]
 
-    def _fill(self, answer: dict[str, Any], found: dict[str, float]) -> None:
+    def _fill(self, answer: dict[str, Any], line: dict[str, float]) -> None:
         """Complete the answer to a reading."""
-        force, spread = found["force"], found["half"] * found["force_scale"]
-        mean, scale = found["stiffness"], found["stiffness_scale"]
-        half, freedom = found["half"] * scale, found["freedom"]
+        force, spread = line["force"], line["half"] * line["force_scale"]
+        mean, scale = line["stiffness"], line["stiffness_scale"]
+        half, freedom = line["half"] * scale, line["freedom"]
         stiffness = {
             "mean": mean,
             "sd": scale * sqrt(freedom / (freedom - 2.0)),
             "credible_95": [mean - half, mean + half],
             "narrowed": 1.0 - half / self.stiffness[1],
         }
-        band = [force - spread, force + spread]
-        alarm = bool(found["alarm"])
+        band, alarm = [force - spread, force + spread], bool(line["alarm"])
         answer |= {
             "status": "ok",
             self._keys[0]: stiffness,
             self._keys[1]: {"predicted": force, "predictive_95": band},
-            "innovation": found["innovation"],
+            "innovation": line["innovation"],
             "alarm": alarm,
-            "alarm_score": found["score"],
+            "alarm_score": line["score"],
             "alarm_since_row": self._since,
             "false_alarm_rows": self._alarm_rows,
-            "correlation": found["correlation"],
-            "tested": bool(found["tested"]),
+            "correlation": line["correlation"],
+            "tested": bool(line["tested"]),
         }
         if any(effect.stage != "noise" for effect in self._draws.model.effects):
-            few = found["draws"] < _LEAST_DRAWS
-            answer |= {"effective_particles": found["draws"], "degenerate": few}
+            few = line["draws"] < _LEAST_DRAWS
+            answer |= {"effective_particles": line["draws"], "degenerate": few}
             if few:
                 stiffness |= dict.fromkeys(("sd", "credible_95", "narrowed"))
         self.readings += 1

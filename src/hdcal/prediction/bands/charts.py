@@ -1,8 +1,7 @@
 """Bands as a chart: the curves of each temperature and direction."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,12 +30,11 @@ _BANDS = (
 _UNTESTED = "not tested: extrapolated"
 
 
-@dataclass(frozen=True)
-class Branch:
-    """The curves of one temperature [°C] and direction.
+class Branch(NamedTuple):
+    """The curves of one temperature [°C] and direction; the label is of the median.
 
-    The median has the label, where no other branch has it; the legend shows the bands
-    of the first branch. Bands are the fainter the more of them lie upon each other.
+    The legend shows the bands of the first branch. Bands are the fainter the more of
+    them lie upon each other.
     """
 
     temperature: float
@@ -69,31 +67,23 @@ def branches(bands: "Bands") -> list[Branch]:
     tested = np.asarray(bands.tested, bool)
     places = bands.deformation_mm[tested if tested.any() else slice(None)]
     side, name = loading_side(places), bands.units.displacement
-    words = movement_words(places, name)
-    found: list[Branch] = []
+    words, opacity = movement_words(places, name), 1.0 / np.sqrt(len(levels))
+    every: list[Branch] = []
     for level, colour in zip(levels.tolist(), colours, strict=True):
         here = bands.temperature_C == level
         ways = list(dict.fromkeys(bands.direction[here].tolist()))
         for way in ways:
             rows = np.flatnonzero(here & (bands.direction == way))
+            rows = rows[np.argsort(bands.deformation_mm[rows], kind="stable")]
             loads = len(ways) == 1 or way == ("down" if side < 0 else "up")
             label = f"median at {level:g} °C" if len(levels) > 1 else "median"
             if not loads:
-                label = f"median, {words[1 if way == 'up' else -1]}"
-                label = "" if len(found) > 1 else label
-            order = np.argsort(bands.deformation_mm[rows], kind="stable")
-            found.append(
-                Branch(
-                    temperature=level,
-                    rows=rows[order],
-                    colour=colour,
-                    loading=loads,
-                    label=label,
-                    first=not found,
-                    opacity=1.0 / np.sqrt(len(levels)),
-                )
-            )
-    return found
+                # The dash of the first one explains all.
+                movement = words[1 if way == "up" else -1]
+                label = "" if len(every) > 1 else f"median, {movement}"
+            first = not every
+            every.append(Branch(level, rows, colour, loads, label, first, opacity))
+    return every
 
 
 def branch_marks(
@@ -133,14 +123,13 @@ def branch_marks(
                     opacity=opacity * branch.opacity,
                     hatched=lined,
                 )
-    dash: Dash = "solid" if branch.loading else "dashed"
+    whole: Dash = "solid" if branch.loading else "dashed"
     name = "" if around_model else branch.label
-    curves: list[tuple[np.ndarray, np.ndarray, str, Dash, float]] = [
-        (middle, tested, name, dash, 1.6),
-        (middle, untested, label(_UNTESTED), "dotted", 1.6),
-        (bands.with_gap_median_N[rows], tested | untested, "", "dashdot", 1.0),
+    curves: list[tuple[np.ndarray, str, Dash, float]] = [
+        (part(middle, tested), name, whole, 1.6),
+        (part(middle, untested), label(_UNTESTED), "dotted", 1.6),
+        (bands.with_gap_median_N[rows] - zero, "", "dashdot", 1.0),
     ]
-    for values, shown, text, how, width in curves:
-        if np.isfinite(part(values, shown)).any():
-            y = part(values, shown)
-            yield Line(label=text, x=x, y=y, colour=colour, dash=how, width=width)
+    for y, text, dash, width in curves:
+        if np.isfinite(y).any():
+            yield Line(label=text, x=x, y=y, colour=colour, dash=dash, width=width)

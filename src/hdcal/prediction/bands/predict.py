@@ -58,14 +58,12 @@ def predict(
     """Predict the force at every pair of deformation and temperature.
 
     Args:
-        models: from `calibrate`, `diagnose` or `Posterior.load`; or several posteriors,
-            each with the probability of its model.
+        models: a calibration, a diagnosis, or posteriors with their probabilities.
         deformation: as read [mm], shape (n,).
         temperature: of the specimen [°C], shape (t,); by default the tested one
             nearest to the reference.
-        direction: of the movement, for effects that depend on it: up where the
-            deformation rises, as read and with its sign; by default the one that
-            loads the gear.
+        direction: of the movement: up where the deformation rises, as read and with
+            its sign; by default the one that loads the gear.
         interval: probability inside the bands.
         seed: of what the draws leave open.
         allow_failed: also for a posterior that failed; the rows then say so.
@@ -154,15 +152,15 @@ def _quantiles(model: JointModel, at: Conditions, tails, seed: int):
 
 
 def _numbers(name: str, given: Any) -> np.ndarray:
-    """Return what was asked as an array of numbers, shape (n,)."""
+    """Return numbers as an array, shape (n,)."""
     try:
-        found = np.atleast_1d(np.asarray(given, dtype=float))
+        numbers = np.atleast_1d(np.asarray(given, dtype=float))
     except (TypeError, ValueError):
-        raise InputError([Finding(name, "is no list of numbers", "")]) from None
-    if found.ndim != 1 or found.size == 0:
-        words = "is empty" if found.size == 0 else "is no list of numbers"
-        raise InputError([Finding(name, words, "Give one or more numbers")])
-    return found
+        numbers = np.empty((0, 0))
+    if numbers.ndim != 1 or numbers.size == 0:
+        words, remedy = "is no list of numbers", "Give one or more"
+        raise InputError([Finding(name, words, remedy)])
+    return numbers
 
 
 def _loading(at: np.ndarray, records: Records) -> np.ndarray:
@@ -203,10 +201,6 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
 
     One block per tested temperature (three over the range if there are many, the middle
     one if they differ by less than 3 K) and per direction that was tested.
-
-    Args:
-        models: a posterior, or several with probabilities, over which bands average.
-        interval: probability inside the bands.
     """
     case = joint(models, allow_failed=True).posterior.case
     grid, levels = _default_grid(case), _default_temperatures(case.records)

@@ -16,25 +16,11 @@ from hdcal.report.result import Result
 class Bands(Result):
     """Equal-tailed bands of the force as read, with one entry per row.
 
-    Attributes:
-        deformation_mm: as read.
-        temperature_C: of the specimen.
-        direction: up or down.
-        physics_lo_N: credible band of the mean reading, without a fitted leftover.
-        with_gap_lo_N: credible band with the leftover discrepancy; NaN if not fitted.
-        new_measurement_lo_N: predictive band of one more reading, on a new run and a
-            new specimen where these were fitted, with the rounding of the rig.
-        tested: deformation, temperature and direction lie within the data.
-        usable: the calibration passed its checks.
-        straight_N: median of the model without the bend that the readings leave
-            possible.
-        interval: probability inside the bands.
-        causes: probability of each hypothesis that was averaged over.
-        weight_left_out: probability of hypotheses that were not calibrated.
-        averaging: sentences on these.
-        tested_range: deformations, temperatures and directions of the data, in words.
-        beyond_tested: largest distance from the tested deformations, as a share of
-            their range.
+    The band of the mean is without a fitted leftover; with it, it is NaN if none was
+    fitted. That of one new reading is on a new run and a new specimen where these were
+    fitted, with the rounding of the rig. `straight_N` is the median of the model
+    without the bend that the readings leave possible, `beyond_tested` the largest
+    distance from the tested deformations, as a share of their range.
     """
 
     template = "prediction/bands/report.md.j2"
@@ -69,11 +55,9 @@ class Bands(Result):
     @property
     def values(self) -> dict[str, tuple[Any, ...]]:
         """Columns of the table by name; what was not fitted is null."""
-        names = {self.units.key(name): name for name in COLUMNS}
-        found = {key: getattr(self, name).tolist() for key, name in names.items()}
         return {
-            key: tuple(None if value != value else value for value in values)
-            for key, values in found.items()
+            str(key): tuple(None if value != value else value for value in values)
+            for key, values in self.to_frame().items()
         }
 
     def to_frame(self) -> pd.DataFrame:

@@ -68,10 +68,7 @@ def divided(
 ) -> dict[str, tuple[float, float, float]]:
     """Divide the variance of an output among its inputs by regression on their draws.
 
-    Args:
-        output: draws, (d,).
-        inputs: draws by name, (d,) each, in the order in which they take their part.
-        rest: name of what no input explains.
+    Inputs take their part in the order given; `rest` names what none explains.
 
     Returns:
         By name the variance of the input, its covariance with what the inputs before

@@ -27,63 +27,49 @@ if TYPE_CHECKING:
 _SMALL = 1e-3
 
 
-def force_chart(found: "Margin") -> Chart:
+def force_chart(margin: "Margin") -> Chart:
     """Return the force with its bounds: at one temperature, or over several."""
-    several = len(found.levels) > 1
-    marks = [*(_over_temperature(found) if several else _at_one(found))]
-    if found.limit_force_N is not None:
-        limit = found.loading_sense * found.limit_force_N
-        name = f"limit {found.limit_force_N:g} {found.units.load_unit}"
-        marks.append(Rule(at=limit, label=name, colour=RED))
-    at = f"{found.deformation_mm:g} {found.units.displacement_unit}"
-    title = f"{found.data.gear}: {found.units.load} needed at {at}"
-    if several:
-        panel = Panel(
-            x="temperature [°C]", y=load_axis(found.units), marks=marks, title=title
-        )
-    else:
-        panel = Panel(
-            x="",
-            y=load_axis(found.units),
-            marks=marks,
-            title=title,
-            names=[
-                f"{_bounds(found)} bounds",
-                f"one {found.member}, 95 %",
-                "mean, 95 %",
-            ],
-            horizontal=True,
-            y_limits=_limits(found),
-        )
+    several, units, limit = len(margin.levels) > 1, margin.units, margin.limit_force_N
+    bounds = f"{100.0 * margin.content:.6g}/{100.0 * margin.confidence:.6g} bounds"
+    marks = [*(_over_temperature(margin, bounds) if several else _at_one(margin))]
+    if limit is not None:
+        label = f"limit {limit:g} {units.load_unit}"
+        marks.append(Rule(at=margin.loading_sense * limit, label=label, colour=RED))
+    at = f"{margin.deformation_mm:g} {units.displacement_unit}"
+    panel = Panel(
+        x="temperature [°C]" if several else "",
+        y=load_axis(units),
+        marks=marks,
+        title=f"{margin.data.gear}: {units.load} needed at {at}",
+        names=[] if several else [bounds, f"one {margin.member}, 95 %", "mean, 95 %"],
+        horizontal=not several,
+        y_limits=(None, None) if several else _limits(margin),
+    )
     return Chart(panels=[panel])
 
 
-def _limits(found: "Margin") -> tuple[float, float]:
+def _limits(margin: "Margin") -> tuple[float, float]:
     """Return ends of the axis with room beside the bars."""
-    level, sign = found.worst, found.loading_sense
-    ends = [level.lower_bound_N, level.upper_bound_N]
-    ends += [] if found.limit_force_N is None else [sign * found.limit_force_N]
+    ends = [margin.worst.lower_bound_N, margin.worst.upper_bound_N]
+    if margin.limit_force_N is not None:
+        ends.append(margin.loading_sense * margin.limit_force_N)
     room = 0.06 * (max(ends) - min(ends))
     return min(ends) - room, max(ends) + room
 
 
-def _bounds(found: "Margin") -> str:
-    return f"{100.0 * found.content:.6g}/{100.0 * found.confidence:.6g}"
-
-
-def _at_one(found: "Margin") -> Iterator[Mark]:
-    level = found.worst
+def _at_one(margin: "Margin") -> Iterator[Mark]:
+    level = margin.worst
     low = [level.lower_bound_N, level.member_N.lo, level.force_N.lo]
     high = [level.upper_bound_N, level.member_N.hi, level.force_N.hi]
     yield Bars(at=np.arange(1.0, 4.0), low=np.array(low), high=np.array(high))
 
 
-def _over_temperature(found: "Margin") -> Iterator[Mark]:
-    levels = sorted(found.levels, key=lambda level: level.temperature_C)
+def _over_temperature(margin: "Margin", bounds: str) -> Iterator[Mark]:
+    levels = sorted(margin.levels, key=lambda level: level.temperature_C)
     x = np.array([level.temperature_C for level in levels])
     untested = beyond(np.array([level.tested for level in levels]))
     for name, kind, opacity in (
-        (f"one {found.member}, 95 %", "member_N", 0.18),
+        (f"one {margin.member}, 95 %", "member_N", 0.18),
         ("mean, 95 %", "force_N", 0.45),
     ):
         spans = [getattr(level, kind) for level in levels]
@@ -99,17 +85,14 @@ def _over_temperature(found: "Margin") -> Iterator[Mark]:
                 opacity=0.0,
                 hatched=True,
             )
-    for end, label in (
-        ("lower_bound_N", f"{_bounds(found)} bounds"),
-        ("upper_bound_N", ""),
-    ):
+    for end, label in (("lower_bound_N", bounds), ("upper_bound_N", "")):
         y = np.array([getattr(level, end) for level in levels])
         yield Line(label=label, x=x, y=y, colour="", width=1.2)
 
 
-def budget_chart(found: "Margin") -> Chart:
+def budget_chart(margin: "Margin") -> Chart:
     """Return the shares of the variance of one member's force."""
-    rows = [row for row in found.budget if row.share >= _SMALL][::-1]
+    rows = [row for row in margin.budget if row.share >= _SMALL][::-1]
     marks = []
     for kind, words, colour in (
         ("A", "A: from the readings", BLUE),
@@ -123,7 +106,7 @@ def budget_chart(found: "Margin") -> Chart:
         x="",
         y="share of the variance [%]",
         marks=marks,
-        title=f"uncertainty of one {found.member}",
+        title=f"uncertainty of one {margin.member}",
         names=[row.component for row in rows],
         horizontal=True,
         y_limits=(0.0, None),

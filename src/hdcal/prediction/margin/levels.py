@@ -1,18 +1,19 @@
-"""Force at each temperature with its bounds, and the exceedance of a limit.
+"""Force at each temperature with its bounds, exceedance of a limit and decision.
 
 A reading lies within half a step of the force: bounds, capacities and the interval of
 the share above the limit are for the worst place of the force in a step. In the
 interval of one member and its probability of exceedance the rounding is a component.
 """
 
+from typing import Literal
+
 import numpy as np
 from scipy.special import ndtri
 
-from hdcal.prediction.conditions import SENSE, is_tested
+from hdcal.prediction.conditions import RAREST, SENSE, is_tested
 from hdcal.prediction.joint import JointModel
-from hdcal.prediction.margin.request import MarginRequest
+from hdcal.prediction.margin.request import MarginRequest, Rule
 from hdcal.prediction.members import Members, one_member, over_draws
-from hdcal.prediction.shares import RAREST
 from hdcal.report.item import TAILS, Interval, Item, Probability, quantity
 
 # Largest relative Monte Carlo error of a probability that is a number. Of an event that
@@ -23,12 +24,8 @@ _ROUGH, _UNSEEN = 0.3, 3.0
 class Exceedance(Item):
     """How probable it is that a member needs more than the capacity.
 
-    Attributes:
-        probability: of one future member, over all draws; an upper limit with 95 %
-            confidence where the draws do not resolve it.
-        lo, hi: 95 % credible interval of the share of the population.
-        at_confidence: share that is not exceeded with the stated confidence.
-        beta: reliability index −Φ⁻¹(P); a lower limit where P is an upper one.
+    Where the draws do not resolve the probability, it is an upper limit with 95 %
+    confidence, and the reliability index −Φ⁻¹(P) a lower one.
     """
 
     probability: Probability = quantity("probability that a member exceeds the limit")
@@ -41,17 +38,10 @@ class Exceedance(Item):
 
 
 class Level(Item):
-    """The force at one temperature.
+    """The force at one temperature; capacities are sizes along the loading.
 
-    Attributes:
-        tested: the data hold this deformation, temperature and direction.
-        force_N: mean of the population, 95 % credible interval.
-        member_N: one future member, 95 % predictive interval.
-        lower_bound_N: exceeded by the share `content`, with the stated confidence.
-        upper_bound_N: not exceeded by that share, with that confidence.
-        capacity_N: least that holds that share, with that confidence; a size along the
-            direction of loading.
-        capacity_median_N: the same with a confidence of a half.
+    The mean of the population has its 95 % credible interval, one future member its
+    95 % predictive interval.
     """
 
     temperature_C: float = quantity("temperature", "°C")
@@ -79,8 +69,8 @@ def force_levels(
     ends = [over_draws(least, 1.0 - sure) - half, capacity]
     low, high = np.sort(sign * np.stack(ends), axis=0)
     mean = np.sort(sign * over_draws(members.centre, TAILS), axis=0)
-    one = one_member(members, step / 12.0**0.5)
-    member = [sign * one.quantile(tail)[0] for tail in TAILS][::sign]
+    member = one_member(members, step / 12.0**0.5)
+    ends_of_member = [sign * member.quantile(tail)[0] for tail in TAILS][::sign]
     tested = is_tested(
         model.posterior.case.records,
         deformation=asked.deformation_mm,
@@ -95,7 +85,7 @@ def force_levels(
             temperature_C=float(warm),
             tested=bool(tested[row]),
             force_N=_interval(mean[:, row]),
-            member_N=_interval([end[row] for end in member]),
+            member_N=_interval([end[row] for end in ends_of_member]),
             lower_bound_N=float(low[row]),
             upper_bound_N=float(high[row]),
             capacity_N=float(capacity[row]),
@@ -123,7 +113,7 @@ def _exceedances(
     most = members.above(limit - half)
     low = over_draws(least, TAILS[0])
     high, sure = over_draws(most, [TAILS[2], asked.confidence])
-    found = []
+    exceedances = []
     for row, mean in enumerate(usual.mean(axis=0)):
         error = float(usual[:, row].std() / model.independent_draws**0.5)
         # Without scatter no draw may lie above the limit: no probability of zero.
@@ -132,7 +122,7 @@ def _exceedances(
         if rough:
             mean = mean + _UNSEEN / model.independent_draws
         mean = float(np.clip(mean, RAREST, 1.0))
-        found.append(
+        exceedances.append(
             Exceedance(
                 probability=mean,
                 error=error,
@@ -143,4 +133,43 @@ def _exceedances(
                 beta=float(-ndtri(min(mean, 1.0 - 1e-16))),
             )
         )
-    return found
+    return exceedances
+
+
+class Conformity(Item):
+    """Decision on one member; limit and guard band are sizes along the loading.
+
+    The probability of conformity is a lower limit where the draws do not resolve it;
+    the risk of false acceptance is the specific one (ISO/IEC 17025, JCGM 106, ILAC-G8).
+    """
+
+    rule: Rule
+    limit_N: float = quantity("limit", "N")
+    guard_band_N: float = quantity("guard band", "N")
+    acceptance_limit_N: float = quantity("acceptance limit", "N")
+    statement: Literal["conforms", "does not conform", "undecided"]
+    probability_of_conformity: Probability
+    false_accept_risk: Probability
+
+
+def decide(
+    rule: Rule, limit: float, estimate: float, low: float, high: float, risk: float
+) -> Conformity:
+    """Return the decision; all numbers are sizes along the loading [N].
+
+    Guarded accepts an estimate if the whole coverage interval keeps the limit, and
+    rejects it if none of the interval does; simple compares the estimate alone. The
+    risk is the probability that one member exceeds the limit.
+    """
+    least, most = (low, high) if rule == "guarded" else (estimate, estimate)
+    rejected = "does not conform" if least > limit else "undecided"
+    guard = most - estimate
+    return Conformity(
+        rule=rule,
+        limit_N=limit,
+        guard_band_N=guard,
+        acceptance_limit_N=limit - guard,
+        statement="conforms" if most <= limit else rejected,
+        probability_of_conformity=1.0 - risk,
+        false_accept_risk=risk,
+    )

@@ -20,8 +20,7 @@ from hdcal.prediction.conditions import (
 from hdcal.prediction.forces import Quantity
 from hdcal.prediction.joint import joint
 from hdcal.prediction.margin.budget import budget
-from hdcal.prediction.margin.decision import Conformity, decide
-from hdcal.prediction.margin.levels import Level, force_levels
+from hdcal.prediction.margin.levels import Conformity, Level, decide, force_levels
 from hdcal.prediction.margin.reached import deformation_reached
 from hdcal.prediction.margin.request import MarginRequest, Rule, checked_request
 from hdcal.prediction.margin.result import CalibrationSource, Margin
@@ -54,7 +53,7 @@ def margin(
     """Return the force needed at a deformation, with bounds, and the margin to it.
 
     Args:
-        models: a posterior, or several with the probabilities of their models.
+        models: a calibration, a diagnosis, or posteriors with their probabilities.
         deformation: as read [mm].
         temperature: of the specimen [°C]; of several the worst counts. By default
             the tested one nearest to the reference.
@@ -78,8 +77,8 @@ def margin(
     model = joint(models)
     asked = checked_request(
         model,
-        deformation,
-        temperature,
+        deformation=deformation,
+        temperature=temperature,
         limit_force=limit_force,
         given_force=given_force,
         content=content,
@@ -119,7 +118,8 @@ def margin(
         expanded_uncertainty_N=expanded,
         budget=rows,
         decision=_decision(asked, worst, estimate),
-        reached=deformation_reached(model.models, asked, at, worst.temperature_C),
+        reached=deformation_reached(model.models, asked, at, worst.temperature_C, step),
+        step_N=step,
         beyond_tested=beyond_tested(asked.deformation_mm, case.records),
         bend_N=(float(bend.mean()), float(bend.std())),
         turn_mm=float(at.turn(case.records)[0]),

@@ -1,7 +1,6 @@
 """Inverse of the margin: the deformation that a given force reaches."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -24,12 +23,8 @@ _NONE = 1e6
 class Reached(Item):
     """The deformation that a force reaches; None where it is not reached in the range.
 
-    Attributes:
-        searched_mm: range of deformation.
-        median_mm: of the mean member, with the ends of its 95 % credible interval.
-        lower_bound_mm: reached by the share `content`, with the stated confidence.
-        upper_bound_mm: not passed by that share, with that confidence.
-        tested: whether the data hold the whole of it.
+    Median and 95 % credible interval are of the mean member; it is tested where the
+    data hold all of its numbers.
     """
 
     force_N: float = labelled("given force", "N")
@@ -44,7 +39,11 @@ class Reached(Item):
 
 
 def deformation_reached(
-    models: Sequence[Model], asked: MarginRequest, at: Conditions, warm: float
+    models: Sequence[Model],
+    asked: MarginRequest,
+    at: Conditions,
+    warm: float,
+    step: float,
 ) -> Reached | None:
     """Return the deformation at which the members first need the given force, if any.
 
@@ -55,48 +54,44 @@ def deformation_reached(
     if force is None:
         return None
     sign = 1 if force > 0.0 else -1
-    records = model.posterior.case.records
-    tested = np.sort(
-        sign * np.array([records.deformation.min(), records.deformation.max()])
-    )
-    places = np.linspace(min(0.0, tested[0]), max(0.0, _REACH * tested[1]), _PLACES)
-    there = replace(
-        at,
-        deformation=sign * places,
-        temperature=np.full(_PLACES, warm),
-        loading=np.full(_PLACES, float(sign)),
-        unloading=np.full(_PLACES, asked.direction == "down"),
+    read = sign * model.posterior.case.records.deformation
+    low, high = float(read.min()), float(read.max())
+    places = np.linspace(min(0.0, low), max(0.0, _REACH * high), _PLACES)
+    unloading = bool(at.unloading[0])
+    there = Conditions.of(
+        sign * places,
+        warm,
+        sign,
+        unloading,
+        quantity=at.quantity,
+        tolerances=at.tolerances,
     )
     members = simulate(model, there, asked.population, seed=asked.seed)
-    step = float(model.problem.step) if asked.quantity == "reading" else 0.0
     half, size, sure = 0.5 * step, abs(force), asked.confidence
 
     def first(curve: np.ndarray, needed: float, shares: Sequence[float]):
         place = first_crossing(curve, needed, places)
         ends = np.clip(place, -1e3 * _NONE, 1e3 * _NONE)
-        found = over_draws(ends[:, None], shares)[:, 0]
-        return [sign * float(x) if abs(x) < _NONE else None for x in found]
+        quantiles = over_draws(ends[:, None], shares)[:, 0]
+        return [sign * float(x) if abs(x) < _NONE else None for x in quantiles]
 
-    middle = first(members.centre, size, TAILS)[::sign]
-    upper = members.quantile(asked.content)
-    lower = members.quantile(1.0 - asked.content)
-    ends = [
-        first(upper, size - half, [1.0 - sure])[0],
-        first(lower, size + half, [sure])[0],
-    ][::sign]
-    numbers = (*middle, *ends)
-    inside = tested[0] - NEAR_MM, tested[1] + NEAR_MM
+    lower, upper = (members.quantile(p) for p in (1.0 - asked.content, asked.content))
+    ends = first(upper, size - half, [1.0 - sure]) + first(lower, size + half, [sure])
+    lo, median, hi = first(members.centre, size, TAILS)[::sign]
+    least, most = ends[::sign]
+    numbers = (lo, median, hi, least, most)
     return Reached(
         force_N=force,
         temperature_C=warm,
         searched_mm=(min(sign * places[[0, -1]]), max(sign * places[[0, -1]])),
-        median_mm=middle[1],
-        lo_mm=middle[0],
-        hi_mm=middle[2],
-        lower_bound_mm=ends[0],
-        upper_bound_mm=ends[1],
+        median_mm=median,
+        lo_mm=lo,
+        hi_mm=hi,
+        lower_bound_mm=least,
+        upper_bound_mm=most,
         tested=all(
-            x is not None and inside[0] <= sign * x <= inside[1] for x in numbers
+            x is not None and low - NEAR_MM <= sign * x <= high + NEAR_MM
+            for x in numbers
         ),
     )
 
@@ -111,6 +106,6 @@ def first_crossing(curve: np.ndarray, needed: float, places: np.ndarray) -> np.n
     rows = np.arange(len(curve))
     low, high = curve[rows, after - 1], curve[rows, after]
     share = np.clip((needed - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-    found = places[after - 1] + share * (places[after] - places[after - 1])
-    found = np.where(passed.any(axis=1), found, np.inf)
-    return np.where(passed[:, 0], -np.inf, found)
+    crossing = places[after - 1] + share * (places[after] - places[after - 1])
+    crossing = np.where(passed.any(axis=1), crossing, np.inf)
+    return np.where(passed[:, 0], -np.inf, crossing)

@@ -1,6 +1,6 @@
 """Request of a margin, and what is wrong with one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -21,40 +21,34 @@ from hdcal.prediction.conditions import (
     excluded_findings,
     far_findings,
     population_findings,
+    share_findings,
     temperature_findings,
     usual_temperature,
     widest,
 )
 from hdcal.prediction.forces import QUANTITIES, Quantity
 from hdcal.prediction.joint import JointModel
-from hdcal.prediction.shares import share_findings
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.report.item import Count, Draws, Item
 from hdcal.report.item import quantity as labelled
 
 Rule = Literal["guarded", "simple"]
-RULES: tuple[Rule, ...] = get_args(Rule)
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+_SHARES = ("content", "confidence")
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "quantity": QUANTITIES,
+    "direction": DIRECTIONS,
+    "rule": get_args(Rule),
+}
 # Temperatures of one answer, at each of which every draw has a force.
 _MOST_TEMPERATURES = 1_000
 
 
 class MarginRequest(Item):
-    """Request of a margin.
+    """Request of a margin; see `margin`.
 
-    Attributes:
-        direction: up to load, down to unload.
-        loading_sense: +1 in compression, -1 in tension; capacities and what
-            exceeds them are sizes along it, forces and bounds have their sign.
-        quantity: reading of the rig, or load on the gear.
-        population: readings, mountings or specimens.
-        content: share of the population within each one-sided bound.
-        confidence: of each bound.
-        limit_force_N: capacity asked about, its size.
-        tolerances_mm: ± of the sizes by name.
-        given_force_N: force with its sign whose deformation is asked for.
-        temperatures_C: of the specimen.
-        rule: of the decision about the limit.
+    The loading is +1 in compression, -1 in tension: capacities and what exceeds them
+    are sizes along it, forces and bounds have their sign.
     """
 
     deformation_mm: float = labelled("deformation", "mm")
@@ -72,98 +66,76 @@ class MarginRequest(Item):
     rule: Rule = Field(exclude=True)
 
 
-def checked_request(
-    model: JointModel,
-    deformation: float,
-    temperature: Any,
-    *,
-    limit_force: float | None,
-    given_force: float | None,
-    content: float,
-    confidence: float,
-    population: Population | None,
-    quantity: Quantity,
-    direction: Direction,
-    tolerances: Mapping[str, float] | None,
-    rule: Rule | None,
-    seed: int,
-) -> MarginRequest:
+def checked_request(model: JointModel, **asked: Any) -> MarginRequest:
     """Return the request that the arguments of `margin` make.
 
     Raises:
         InputError: holds everything that is wrong with them.
     """
-    posterior, problem = model.posterior, model.problem
-    case, sizes = posterior.case, dict(tolerances or {})
-    warm = usual_temperature(case) if temperature is None else temperature
-    numbers = {"deformation": deformation, "content": content, "confidence": confidence}
-    numbers |= {"limit_force": limit_force, "given_force": given_force}
+    posterior, case = model.posterior, model.posterior.case
+    sizes = dict(asked.pop("tolerances") or {})
+    asked["rule"], rule = asked["rule"] or "guarded", asked["rule"]
+    if (warm := asked.pop("temperature")) is None:
+        warm = usual_temperature(case)
     with Findings() as wrong:
-        for name, given in numbers.items():
-            if given is not None and _axes(given) != 0:
+        for name in ("deformation", "limit_force", "given_force", *_SHARES):
+            if asked[name] is not None and _axes(asked[name]) != 0:
                 words, remedy = "is not one number", "Ask for one at a time"
                 wrong.append(Finding(name, words, remedy))
         if _axes(warm) not in (0, 1):
             wrong.append(Finding("temperature", "is no list of numbers", "Give °C"))
-    levels = np.atleast_1d(np.asarray(warm, float))
+    deformation, levels = (
+        asked.pop("deformation"),
+        np.atleast_1d(np.asarray(warm, float)),
+    )
     loading = direction_of_loading(model, deformation)
-    movement = loading * SENSE.get(direction, 0.0)
-    population = population or widest(problem)
+    movement = loading * SENSE.get(asked["direction"], 0.0)
+    asked["population"] = asked["population"] or widest(model.problem)
+    limit, force = asked.pop("limit_force"), asked.pop("given_force")
     with Findings() as wrong:
         impossible = [*_deformation(posterior, deformation, movement)]
         wrong += impossible
         wrong += _temperatures(model, levels)
-        shares, more = (
-            {"content": content, "confidence": confidence},
-            ", or calibrate with more draws",
-        )
+        shares, more = {n: asked[n] for n in _SHARES}, ", or calibrate with more draws"
         wrong += share_findings(shares, model.size, more)
-        wrong += implausible("seed", seed)
-        wrong += population_findings(population, problem)
+        wrong += implausible("seed", asked["seed"])
+        wrong += population_findings(asked["population"], model.problem)
         wrong += check_tolerances(sizes, case.gear.geometry, posterior.theory)
         # Beside a deformation that is refused no force looks right.
         if not impossible:
-            for name in ("limit_force", "given_force"):
-                wrong += _force(model, name, numbers[name], deformation, loading)
-        for name, value, known in (
-            ("quantity", quantity, QUANTITIES),
-            ("direction", direction, DIRECTIONS),
-            ("rule", rule or "guarded", RULES),
-        ):
-            if value not in known:
-                remedy = f"Use {' or '.join(known)}"
-                wrong.append(Finding(name, f"'{value}' is unknown", remedy))
-        if rule is not None and limit_force is None:
+            wrong += _force(model, "limit_force", limit, deformation, loading)
+            wrong += _force(model, "given_force", force, deformation, loading)
+        for name, known in _CHOICES.items():
+            if asked[name] not in known:
+                words, remedy = (
+                    f"'{asked[name]}' is unknown",
+                    f"Use {' or '.join(known)}",
+                )
+                wrong.append(Finding(name, words, remedy))
+        if rule is not None and limit is None:
             words, remedy = "decides nothing without a limit", "Give `limit_force` too"
             wrong.append(Finding("rule", words, remedy))
-        if quantity == "load" and not _knows_contact(posterior):
+        if asked["quantity"] == "load" and not _knows_contact(posterior):
             words = "needs the place of first contact, and the readings are far from 0"
             remedy = "State deformation_offset in [priors], or count from there"
             wrong.append(Finding("quantity", words, remedy))
     return MarginRequest(
+        **asked,
         deformation_mm=float(deformation),
-        direction=direction,
         loading_sense=loading,
-        quantity=quantity,
-        population=population,
-        content=content,
-        confidence=confidence,
-        limit_force_N=None if limit_force is None else abs(limit_force),
-        tolerances_mm={name: float(by) for name, by in sizes.items()},
-        seed=seed,
-        given_force_N=given_force,
+        limit_force_N=None if limit is None else abs(limit),
+        tolerances_mm=sizes,
+        given_force_N=force,
         temperatures_C=levels,
-        rule=rule or "guarded",
     )
 
 
 def _axes(given: object) -> int | None:
     """Return the number of axes of numbers; None where it holds no numbers."""
     try:
-        found = np.asarray(given, dtype=float)
+        return None if isinstance(given, str) else np.asarray(given, float).ndim
     except (TypeError, ValueError):
         return None
-    return None if isinstance(given, str) else found.ndim
 
 
 def _deformation(
@@ -185,7 +157,7 @@ def _deformation(
 
 def _temperatures(model: JointModel, temperature: np.ndarray) -> list[Finding]:
     name = "temperature"
-    if temperature.size == 0 or not np.isfinite(temperature).all():
+    if temperature.size == 0:
         return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
     if temperature.size > _MOST_TEMPERATURES:
         words = f"{temperature.size} temperatures are too many"

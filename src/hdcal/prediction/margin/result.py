@@ -9,8 +9,7 @@ from pydantic import Field, InstanceOf, computed_field
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.budget import BudgetRow
 from hdcal.prediction.margin.charts import budget_chart, force_chart
-from hdcal.prediction.margin.decision import Conformity
-from hdcal.prediction.margin.levels import Level
+from hdcal.prediction.margin.levels import Conformity, Level
 from hdcal.prediction.margin.reached import Reached
 from hdcal.prediction.margin.request import MarginRequest, Share
 from hdcal.report.charts.chart_spec import Chart
@@ -39,25 +38,10 @@ class CalibrationSource(Item):
 class Margin(MarginRequest, Result):
     """The force needed at a deformation, and the margin of a capacity.
 
-    Attributes:
-        levels: one per temperature.
-        worst: the level with the largest bound.
-        estimate_N: estimate of one member there.
-        expanded_uncertainty_N: half width of the coverage interval; the coverage factor
-            times the combined standard uncertainty.
-        budget: components of the uncertainty, the largest first.
-        decision: whether the force keeps the limit.
-        reached: deformation that a given force reaches.
-        causes: probability of each hypothesis that was averaged over.
-        weight_left_out: probability of hypotheses that were not calibrated.
-        beyond_tested: distance of the deformation from the tested range, as a share of
-            that range.
-        interval: probability inside the intervals.
-        posterior: of the most probable model.
-        bend_N: mean and sd of the bend at the deformation.
-        averaging: sentences on the hypotheses.
-        warnings: on the residuals and the noise.
-        turn_mm: deformation at which unloading begins.
+    Of one level per temperature the worst has the largest bound; estimate, budget and
+    decision are of one member there. `beyond_tested` is the distance from the tested
+    range as a share of it, `bend_N` mean and sd of the bend, `turn_mm` where unloading
+    begins.
     """
 
     template = "prediction/margin/report.md.j2"
@@ -84,6 +68,7 @@ class Margin(MarginRequest, Result):
     averaging: tuple[str, ...] = Field(exclude=True)
     warnings: tuple[str, ...] = Field(exclude=True)
     turn_mm: float = Field(exclude=True)
+    step_N: float = Field(exclude=True)
 
     @computed_field
     @property
@@ -104,17 +89,6 @@ class Margin(MarginRequest, Result):
         return "load" if is_load else _MEMBER[self.population]
 
     @property
-    def members(self) -> str:
-        """Word for several members of the population."""
-        return f"{self.member}s"
-
-    @property
-    def step_N(self) -> float:
-        """Step of the reading, 0 for a load [N]."""
-        step = float(self.posterior.problem.step)
-        return step if self.quantity == "reading" else 0.0
-
-    @property
     def facts(self) -> dict[str, str]:
         """Gear, sizes and data in words."""
         case = self.posterior.case
@@ -130,10 +104,7 @@ class Margin(MarginRequest, Result):
         return {"margin": force_chart(self), "budget": budget_chart(self)}
 
     def certificate(self, issued: "date") -> str:
-        """Return the certificate as the text of an HTML page of one A4 sheet.
-
-        Args:
-            issued: date of issue.
+        """Return the certificate, with its date of issue, as a page of HTML.
 
         Raises:
             NotUsable: the calibration failed its checks.
