@@ -83,7 +83,7 @@ def test_each_bound_has_its_confidence():
         "specimen_sd": rng.uniform(0.01, 0.03, 4000),
     }
     gears = stiffness_of_gears(population)
-    bounds = gears.bounds(0.9, 0.95)
+    bounds = gears.bounds(0.9)
     low, high = bounds.at_least, bounds.at_most
     assert np.mean(gears.above(low) >= 0.9) == pytest.approx(0.95, abs=1e-3)
     assert np.mean(1.0 - gears.above(high) >= 0.9) == pytest.approx(0.95, abs=1e-3)

@@ -51,7 +51,7 @@ def with_loop():
 
 @pytest.fixture(scope="module")
 def one_gear():
-    return usable_gears(hdcal.read_case(fleet(0.8)))[0][0]
+    return usable_gears(hdcal.read_case(fleet(0.8)))[0]["G1"]
 
 
 def causes_of(found: FleetCauses) -> list[tuple[str, ...]]:

@@ -21,12 +21,10 @@ _LEAST = 1e-300
 
 
 class Frequencies(NamedTuple):
-    """Draws of frequencies and causes.
+    """Share of each cause among gears to come (chain, draw, k); cause of each gear.
 
-    Attributes:
-        share: of each cause among gears to come, shape (chain, draw, k).
-        cause: index of the cause of each gear, shape (chain, draw, g).
-        chance: of each cause in each gear, given all gears, shape (g, k).
+    The cause is an index (chain, draw, g); `chance` is the probability of each cause in
+    each gear, given all gears (g, k).
     """
 
     share: np.ndarray
@@ -49,8 +47,8 @@ def sample_frequencies(
             shape (g, k).
         counts: of the Dirichlet prior, in gears, shape (k,).
         rng: source of randomness.
-        chains: number of chains.
-        draws: of each chain.
+        chains: number of chains, each with as many draws.
+        draws: number of draws.
     """
     gears, causes = log_likelihood.shape
     cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)

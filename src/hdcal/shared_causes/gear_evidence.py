@@ -22,12 +22,7 @@ _RANGE = (1e-3, 1.0 - 1e-3)
 
 
 class Weight(NamedTuple):
-    """Evidence of one cause.
-
-    Attributes:
-        log_evidence: of the readings of a gear [nat].
-        log_prior: log of the prior probability.
-    """
+    """Log evidence of one cause in the readings of a gear [nat], and its log prior."""
 
     log_evidence: float
     log_prior: float
@@ -42,17 +37,17 @@ def weigh_gear(
 
     The force offsets of runs are integrated out in every hypothesis.
     """
-    remedy = "Leave the gear out, or diagnose it alone"
     try:
         searched = search(gear, library, free_runs=True)
-        found = by_cause(searched, np.random.default_rng(seed))
+        weights = by_cause(searched, np.random.default_rng(seed))
+        if not np.all(np.isfinite([*weights.values()])):
+            raise ArithmeticError("it is not finite")
     except InputError as error:
         return error.findings[0]
     except (ArithmeticError, np.linalg.LinAlgError) as error:
+        remedy = "Leave the gear out, or diagnose it alone"
         return Finding(gear.name, f"its evidence failed ({error})", remedy)
-    if not np.all(np.isfinite([*found.values()])):
-        return Finding(gear.name, "its evidence is not finite", remedy)
-    return found
+    return weights
 
 
 def by_cause(searched: Searched, rng: np.random.Generator) -> dict[str, Weight]:

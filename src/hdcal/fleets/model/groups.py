@@ -121,14 +121,6 @@ def gains_of_rigs(
     return grouping(covariance @ pull, covariance)
 
 
-def rigs_are_linked(gear: np.ndarray, rig: np.ndarray) -> bool:
-    """Return whether gears that several rigs measured compare all of the rigs."""
-    gears, size = 1 + int(gear.max()), 2 + int(gear.max()) + int(rig.max())
-    links = np.ones(len(gear)), (gear, gears + rig)
-    links = scipy.sparse.coo_array(links, (size, size))
-    return scipy.sparse.csgraph.connected_components(links, directed=False)[0] == 1
-
-
 def robust_sd(values: np.ndarray) -> float:
     """Return the sd of normal values about zero by their median size."""
     return float(np.median(np.abs(values)) / scipy.special.ndtri(0.75))
