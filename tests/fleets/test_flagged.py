@@ -7,8 +7,7 @@ from gear_rows import ordinary
 from scipy.stats import binomtest
 
 from hdcal.fleets.gear_table import QUANTITIES
-from hdcal.fleets.model.population import FittedFleet, fit_population
-from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.model.population import FittedFleet, Sampling, fit_population
 from hdcal.fleets.reading.read_fleet import read_fleet
 
 

@@ -12,8 +12,7 @@ from scipy.linalg import helmert
 
 from hdcal.data.prior import Prior
 from hdcal.fleets.model import quantities as priors
-from hdcal.fleets.model.population import fit_population
-from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.model.population import Sampling, fit_population
 
 # False-alarm probability of each test of one quantity; the seeds are fixed.
 LEVEL = 1e-3

@@ -6,8 +6,8 @@ import pytest
 from gear_records import records, refused
 from gear_rows import ordinary
 
-from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
+from hdcal.fleets.reading.readings import RowSums, reading_vectors
 from hdcal.fleets.reading.record_faults import faults_among_gears, irregular
 
 ODD = "G3"

@@ -76,13 +76,9 @@ class _Sums(NamedTuple):
 def changes(
     day: np.ndarray, value: np.ndarray, variance: np.ndarray, time: np.ndarray
 ) -> Changes:
-    """Return whether, how and when values change.
+    """Return whether, how and when values (n,) with errors of a variance change.
 
-    Args:
-        day: index of each value's date, in the order of dates, shape (n,).
-        value: shape (n,).
-        variance: of each value's error, shape (n,).
-        time: of each date, ascending, shape (d,), two or more.
+    `day` is the index of each value's date, `time` of each date ascends, (d,).
     """
     # One wild value moves neither the median nor the grid.
     value = value - np.median(value)
@@ -128,10 +124,7 @@ def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
 
 
 def _segments(sums: _Sums) -> tuple[np.ndarray, float]:
-    """Return log prior and evidence of levels, [scatter, start, stop].
-
-    With the log prior of one level over all dates.
-    """
+    """Return log prior and evidence of levels, [scatter, start, stop], prior of one."""
     scatters, ends = sums.weight.shape
     begin = min(_EXPECTED / (ends - 2), 0.5)
     found = np.full((scatters, ends, ends), -np.inf)
@@ -180,10 +173,7 @@ def _line(sums: _Sums, place: np.ndarray):
 
 
 def _steps(sums: _Sums, share: np.ndarray, ends: list[int]) -> Iterator[LevelStep]:
-    """Yield steps between levels with these ends, each given the other steps.
-
-    `share` is the probability of each scatter.
-    """
+    """Yield steps between levels with these ends, given the share of each scatter."""
     for start, stop in zip(ends, ends[2:], strict=False):
         place = np.arange(start + 1, stop)
         likely = sums.segment([start], place) + sums.segment(place, [stop])

@@ -74,8 +74,7 @@ def fleet(console: Console, out, force, scheduler, gears, skip_bad, **given):
         console.reserve_folder(out, force)
     assert readings is not None
     from hdcal.fleets.fleet import fleet_of
-    from hdcal.fleets.model.population import fit_population
-    from hdcal.fleets.model.sampling import Sampling
+    from hdcal.fleets.model.population import Sampling, fit_population
 
     with progress_bar() as progress:
         fit = fit_population(readings, Sampling(seed=seed, progress=progress))

@@ -13,8 +13,7 @@ from hdcal.errors import Findings
 from hdcal.fleets.gauge import gauge_rr
 from hdcal.fleets.gear_table import GearLeftOut, flagged_gears, gear_table
 from hdcal.fleets.model.groups import group_offsets
-from hdcal.fleets.model.population import FittedFleet, fit_population
-from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.model.population import FittedFleet, Sampling, fit_population
 from hdcal.fleets.next_gear import force_findings, next_force, next_gear
 from hdcal.fleets.over_time import over_time
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
@@ -62,7 +61,7 @@ def fleet(
             specimen and columns such as wall_thickness_mm.
         scheduler: address of a Dask scheduler that reads a Parquet folder.
         skip_bad: leave out gears with a fault.
-        progress: called with (steps done, steps in all).
+        progress: called with (quantities done, quantities in all).
 
     Raises:
         InputError: there are too few gears, one is faulty and may not be left out, or

@@ -37,10 +37,7 @@ class GaugeRR(Item):
 def gauge_rr(
     draws: Mapping[str, np.ndarray], deformation: float, tolerance: float | None = None
 ) -> GaugeRR:
-    """Return the gauge R&R of a population, from its draws by site.
-
-    The force is read at a deformation [mm as read]; it may lie within a width [N].
-    """
+    """Return the gauge R&R at a deformation [mm as read], and a tolerance [N]."""
     none = np.zeros(1)
     repeat = reading_sd(draws)
     force = draws["stiffness"] * abs(deformation)

@@ -133,14 +133,9 @@ def next_force(
     tested: float,
     seed: int = 0,
 ) -> NextForce:
-    """Return the force of gears to come at a deformation.
+    """Return the force of gears to come at a deformation, of any sign [mm as read].
 
-    Args:
-        draws: of the population by site, shape (d,).
-        deformation: as read, with the sign of the data [mm].
-        limit_force: a capacity, its size [N].
-        tested: largest deformation that was read [mm].
-        seed: of the predictive draws.
+    The capacity is a size [N]; `tested` is the largest deformation read.
     """
     gears = force_of_gears(draws, deformation)
     above = None if limit_force is None else Interval.of(gears.above(limit_force))
@@ -178,12 +173,10 @@ def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
-    """Return the sd of a new lot, operator or rig about the mean of those measured.
-
-    It includes the error of this mean, and is zero without such groups.
-    """
+    """Return the sd of a new lot, operator or rig about the mean of those measured."""
     if f"{kind}_sd" not in draws:
         return np.zeros(1)
+    # The mean of those measured has an error too.
     measured = sum(name.removeprefix(f"{kind}_").isdigit() for name in draws)
     return draws[f"{kind}_sd"] * np.sqrt(1.0 + 1.0 / measured)
 

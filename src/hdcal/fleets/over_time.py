@@ -32,9 +32,6 @@ class LevelChange(Item):
 class Change(Item):
     """How one quantity depends on the date of measurement.
 
-    The stiffness of gears is that about the centre of their lot, the zero that of the
-    mountings of a gear on one day about that of their operator.
-
     Attributes:
         probability_changed: that it changes at all, 0.5 before the data.
         drift: from the first date to the last, if it is steady.
@@ -70,11 +67,8 @@ def over_time(readings: FleetReadings, fit: FittedFleet) -> tuple[Change, ...]:
 
 
 def _measured(readings: FleetReadings, fit: FittedFleet) -> dict[str, pd.DataFrame]:
-    """Return the stiffness of gears [%], the zero on days, and the noise of gears [%].
-
-    They follow from the lines of each gear alone: the population would shrink them
-    towards each other.
-    """
+    """Return stiffness [%] and noise [%] of gears, and their zeros on days."""
+    # The population would shrink them towards each other: they are of each gear alone.
     case, sums, groups, fits = readings.case, readings.sums, fit.groups, fit.fits
     middle = {name: np.median(values) for name, values in fit.draws.items()}
     kinds = "lot", "rig", "operator"

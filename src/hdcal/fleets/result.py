@@ -15,10 +15,10 @@ from hdcal.fleets.gear_table import Flagged, GearLeftOut
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.model.quantities import population_priors
-from hdcal.fleets.next_gear import NextForce, NextGear
+from hdcal.fleets.next_gear import NextForce, NextGear, stiffness_of_gears
 from hdcal.fleets.over_time import Change
-from hdcal.fleets.posterior import population_tree
 from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.inference.posterior_tree import dataset
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 # A stiffness so many prior sds from that of the theory is reported.
 _FAR = 3.0
+_IN_NEWTONS = ("zero", "run_offset_sd", "sigma", "loop", "bend", "operator")
 # Gears in the table of a terminal, and of a page; gears.csv has all of them.
 _LISTED, _MOST_LISTED = 25, 2000
 
@@ -44,9 +45,8 @@ _LISTED, _MOST_LISTED = 25, 2000
 class Population(Item):
     """Population of the ordinary gears, per mm as read; 95 % credible intervals.
 
-    Lots, rigs and operators have an sd if they are distinguished. The loop is the force
-    of loading above unloading, the bend how far the middle of the curve lies below its
-    chord.
+    The loop is the force of loading above unloading, the bend how far the middle of the
+    curve lies below its chord.
     """
 
     stiffness_N_per_mm: Interval = quantity("stiffness of the centre", "N/mm")
@@ -142,8 +142,19 @@ class Fleet(Result):
         return table.rename(columns=self.units.key)
 
     def to_datatree(self) -> "xr.DataTree":
-        """Return the draws of the population in the groups of ArviZ."""
-        return population_tree(self)
+        """Return draws of the population and of gears to come, in groups of ArviZ."""
+        import xarray as xr
+
+        fit, chains = self.fit, int(self.fit.settings["chains"])
+        draws = {site: values.reshape(chains, -1) for site, values in fit.draws.items()}
+        units = {site: self.units.unit(_unit(site)) for site in draws}
+        population = dataset(draws, units=units)
+        for kind in ("lot", "operator", "rig"):
+            for place, label in enumerate(getattr(fit.groups, f"{kind}s"), 1):
+                population[f"{kind}_{place}"].attrs["long_name"] = label
+        gears = stiffness_of_gears(fit.draws).sample(self.seed).reshape(chains, -1)
+        groups = {"predictions": dataset({"stiffness": gears}, units=units)}
+        return xr.DataTree.from_dict({"posterior": population} | groups)
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the gears, their readings, and changes with the date."""
@@ -197,3 +208,11 @@ class Fleet(Result):
             kind: (len({*getattr(case, kind)}), len(getattr(self, kind)))
             for kind in kinds
         }
+
+
+def _unit(site: str) -> str:
+    """Return the unit of a site, in N and mm."""
+    if site == "stiffness":
+        return "N/mm"
+    share = site.endswith(("_share", "_ratio")) or site == "noise_spread"
+    return "N" if site.startswith(_IN_NEWTONS) and not share else "1"

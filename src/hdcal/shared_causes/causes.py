@@ -54,10 +54,6 @@ def causes(
 ) -> FleetCauses:
     """Find which effects many gears have, and how frequent each one is.
 
-    The evidence of each gear is computed as `diagnose` does, with free offsets of its
-    runs. The frequencies of causes follow from the evidence of all gears, and the
-    causes of each gear from both.
-
     Args:
         data: readings of many gears: a case; a table or file as `read_case` takes it,
             with a column `specimen`; or a folder with a file, or a folder, for each.

@@ -42,13 +42,8 @@ def sample_frequencies(
 ) -> Frequencies:
     """Draw frequencies and causes in independent chains.
 
-    Args:
-        log_likelihood: of each gear's readings by cause, up to a constant of the gear,
-            shape (g, k).
-        counts: of the Dirichlet prior, in gears, shape (k,).
-        rng: source of randomness.
-        chains: number of chains, each with as many draws.
-        draws: number of draws.
+    The likelihood of each gear by cause has the shape (g, k), the counts of the
+    Dirichlet prior, in gears, (k,).
     """
     gears, causes = log_likelihood.shape
     cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)
@@ -83,10 +78,7 @@ def _exchange(
     counts: np.ndarray,
     rng: np.random.Generator,
 ) -> None:
-    """Exchange the gears of two causes with the Metropolis probability.
-
-    Frequencies are integrated out.
-    """
+    """Exchange the gears of two causes, the frequencies integrated out (Metropolis)."""
     one, other = cause[rng.integers(len(cause))], rng.integers(len(counts))
     if one == other:
         return

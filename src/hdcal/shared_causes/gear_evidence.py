@@ -33,10 +33,7 @@ class Weight(NamedTuple):
 def weigh_gear(
     gear: Case, library: Mapping[str, type[Effect]], seed: int
 ) -> dict[str, Weight] | Finding:
-    """Return the evidence of each cause, or why there is none.
-
-    The force offsets of runs are integrated out in every hypothesis.
-    """
+    """Return the evidence of each cause, offsets of runs integrated out, or a fault."""
     try:
         searched = search(gear, library, free_runs=True)
         weights = by_cause(searched, np.random.default_rng(seed))
@@ -84,10 +81,7 @@ def _mean(hypotheses: np.ndarray) -> Weight:
 def _shares(
     searched: Searched, key: Names, rng: np.random.Generator | None
 ) -> dict[str, tuple[float, float]]:
-    """Return each cause's prior share of a hypothesis, and the readings' factor on it.
-
-    Without a source of randomness the shares stay at their prior.
-    """
+    """Return each cause's prior share of a hypothesis, and the factor of readings."""
     effects = [name for name in key if name != OUTSIDE]
     if OUTSIDE not in key or not effects:
         return {name: (1.0 / len(key), 1.0) for name in key} or {NONE: (1.0, 1.0)}

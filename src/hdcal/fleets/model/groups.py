@@ -78,10 +78,9 @@ def group_offsets(values: Mapping, kind: str) -> Float[Array, "k ..."]:
 
 
 def distinguished(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
-    """Return the names of groups and the index of the group of each label.
+    """Return the names of groups and the group of each label.
 
-    Both are empty for a single group, for more than `MOST_GROUPS`, and for as many
-    groups as labels.
+    A single group, more than `MOST_GROUPS`, or as many as labels are none.
     """
     names, index = np.unique(np.array(labels, str), return_inverse=True)
     if 1 < len(names) <= min(MOST_GROUPS, len(labels) - 1):

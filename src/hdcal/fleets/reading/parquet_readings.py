@@ -18,8 +18,13 @@ from hdcal.data.measurements.screened import asked_range, screened
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.turning_rows import sense_at_turns
 from hdcal.errors import Finding, InputError
-from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.reading.readings import FleetReadings, modulus_left, readings_of
+from hdcal.fleets.reading.readings import (
+    FleetReadings,
+    RowSums,
+    modulus_left,
+    reading_vectors,
+    readings_of,
+)
 from hdcal.fleets.reading.record_faults import irregular
 from hdcal.screening.result import Observation
 from hdcal.screening.screen import screen
