@@ -233,17 +233,3 @@ def test_a_folder_for_each_gear_states_its_sizes(tmp_path):
     assert {*usable(read_fleet(folder), skip_bad=True).case.left_out} == {"G2"}
     frame.to_csv(folder / "G1.csv", index=False)
     assert any("as folders" in words for words in refused(read_fleet, folder))
-
-
-def test_a_gear_with_a_fault_in_one_file_is_left_out_of_all(tmp_path):
-    frame = records(gears=5).astype({"force_N": object})
-    for run, part in frame.groupby("run"):
-        part = part.drop(columns="run").reset_index(drop=True)
-        part.loc[2, "force_N"] = "abc" if run else part.loc[2, "force_N"]
-        part.to_csv(tmp_path / f"F{run}.csv", index=False)
-    found = usable(read_fleet(tmp_path, SIZES), skip_bad=True)
-    assert found.case.specimen_labels == ("G1", "G2", "G3", "G4")
-    assert {*found.case.left_out} == {"G0"}
-    # Of a file that cannot be read nobody knows which gears it held.
-    (tmp_path / "F2.csv").write_text("nothing\n")
-    assert all("F2.csv" in words for words in refused(read_fleet, tmp_path, SIZES))

@@ -1,5 +1,6 @@
 """Many gears of one kind: the population, the odd gears, the next gear."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -147,25 +148,21 @@ def _population(fit: FittedFleet) -> Population:
 
 def _groups(readings: FleetReadings, fit: FittedFleet) -> dict[str, Any]:
     """Return the lots, operators and rigs that are distinguished."""
-    case, centre = readings.case, fit.draws["stiffness"]
+    case, draws = readings.case, fit.draws
     lots, operators, rigs = (
-        np.asarray(group_offsets(fit.draws, kind))
-        for kind in ("lot", "operator", "rig")
+        np.asarray(group_offsets(draws, kind)) for kind in ("lot", "operator", "rig")
     )
-    each = {
-        "lots": (centre * (1.0 + lots), case.units.stiffness_unit),
-        "operators": (operators, case.units.load_unit),
-        "rigs": (100.0 * rigs, "%"),
-    }
-    return {
-        kind: tuple(
-            Group(
-                name=name,
-                members=getattr(case, kind).count(name),
-                value=Interval.of(value),
-                unit=unit,
-            )
-            for name, value in zip(getattr(fit.groups, kind), values, strict=False)
+    lots = draws["stiffness"] * (1.0 + lots)
+
+    def of(kind: str, values: np.ndarray, unit: str) -> tuple[Group, ...]:
+        members, names = Counter(getattr(case, kind)), getattr(fit.groups, kind)
+        return tuple(
+            Group(name=name, members=members[name], value=Interval.of(value), unit=unit)
+            for name, value in zip(names, values, strict=False)
         )
-        for kind, (values, unit) in each.items()
+
+    return {
+        "lots": of("lots", lots, case.units.stiffness_unit),
+        "operators": of("operators", operators, case.units.load_unit),
+        "rigs": of("rigs", 100.0 * rigs, "%"),
     }

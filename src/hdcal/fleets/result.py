@@ -187,11 +187,6 @@ class Fleet(Result):
         return [source for source in sources if source[1] is not None]
 
     @property
-    def agreeing(self) -> int:
-        """Number of gears that are not flagged in their stiffness."""
-        return self.gears - sum("stiffness" in gear.quantities for gear in self.flagged)
-
-    @property
     def from_theory(self) -> tuple[float, float] | None:
         """Stiffness over that of the theory, and the latter, if they are far apart."""
         expected = population_priors(self.readings.case)[1]["stiffness"]

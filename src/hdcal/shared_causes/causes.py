@@ -129,17 +129,6 @@ def _together(
         for k, (label, gear) in enumerate(gears.items())
     ]
     unused = [GearCauses(gear=g, status=f"left out: {w}") for g, w in why.items()]
-    share, cause = (each.reshape(-1, each.shape[-1]) for each in drawn[:2])
-    shared = [
-        SharedCause(
-            cause=names[k],
-            gears_named=sum(each == (names[k],) for each in sets),
-            gears=Interval.of(np.sum(cause == k, axis=1)),
-            share=Interval.of(share[:, k]),
-            log_evidence_nat=float(gain[:, k].sum()),
-        )
-        for k in np.argsort(-share.mean(axis=0), kind="stable").tolist()
-    ]
     return FleetCauses(
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
@@ -147,12 +136,12 @@ def _together(
         gears=len(gears),
         rows=sum(len(gear.records.force) for gear in gears.values()),
         left_out=why,
-        causes=tuple(shared),
+        causes=_shared(names, drawn, sets, gain),
         not_shown=tuple(name for name in library if name not in names),
         confounded=confounded,
         notes=(*words, *case.notes),
         seed=seed,
-        draws=len(share),
+        draws=drawn.share[..., 0].size,
         versions=versions(),
         data_sha256=case.data_sha256,
         each_gear=(*used, *unused),
@@ -174,6 +163,26 @@ def _sampled(
         draws *= 2
         if draws > _MOST_DRAWS or have_mixed(checked):
             return drawn, checked
+
+
+def _shared(
+    names: list[str],
+    drawn: Frequencies,
+    sets: Sequence[tuple[str, ...]],
+    gain: np.ndarray,
+) -> tuple[SharedCause, ...]:
+    """Return the causes over all gears, the most frequent first."""
+    share, cause = (draws.reshape(-1, draws.shape[-1]) for draws in drawn[:2])
+    return tuple(
+        SharedCause(
+            cause=names[k],
+            gears_named=sum(causes == (names[k],) for causes in sets),
+            gears=Interval.of(np.sum(cause == k, axis=1)),
+            share=Interval.of(share[:, k]),
+            log_evidence_nat=float(gain[:, k].sum()),
+        )
+        for k in np.argsort(-share.mean(axis=0), kind="stable").tolist()
+    )
 
 
 def _confounded(

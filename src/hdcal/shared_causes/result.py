@@ -1,13 +1,10 @@
 """The causes of many gears as a result."""
 
-from collections.abc import Mapping
 from typing import Literal
 
-import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.inference.checks import Check
-from hdcal.report.charts.chart_spec import ORANGE, Bars, Chart, Panel, Points
 from hdcal.report.item import (
     INTERVAL,
     Count,
@@ -19,7 +16,6 @@ from hdcal.report.item import (
     Words,
 )
 from hdcal.report.result import Result
-from hdcal.report.words import label
 from hdcal.shared_causes.gear_evidence import NONE
 
 # Less frequent causes are in the JSON alone.
@@ -99,12 +95,6 @@ class FleetCauses(Result):
     name: str = Field(exclude=True)
 
     @property
-    def used(self) -> tuple[GearCauses, ...]:
-        """The gears that are not left out, the most probable effects first."""
-        kept = self.each_gear[: self.gears]
-        return tuple(sorted(kept, key=lambda gear: gear.probability_none or 0.0))
-
-    @property
     def kinds(self) -> dict[tuple[str, ...], list[str]]:
         """Gears by their causes, the most frequent first."""
         kinds: dict[tuple[str, ...], list[str]] = {}
@@ -116,22 +106,3 @@ class FleetCauses(Result):
     def common(self) -> tuple[SharedCause, ...]:
         """Causes that are frequent enough to be shown."""
         return tuple(c for c in self.causes if c.share.median >= RARE or c.gears_named)
-
-    def make_charts(self) -> Mapping[str, Chart]:
-        """Return the share of each cause among gears to come."""
-        at = np.arange(1.0, len(self.common) + 1.0)
-        shares = [each.share for each in self.common]
-        low, middle, high = 100.0 * np.array([(s.lo, s.median, s.hi) for s in shares]).T
-        panel = Panel(
-            x="",
-            y="share of gears to come [%]",
-            marks=[
-                Bars(label="95 % interval", at=at, low=low, high=high),
-                Points(label="median", x=at, y=middle, colour=ORANGE),
-            ],
-            names=[label(each.cause) for each in self.common],
-            horizontal=True,
-            y_limits=(0.0, 100.0),
-            wide=True,
-        )
-        return {"causes": Chart(panels=[panel])}

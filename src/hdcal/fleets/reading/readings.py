@@ -54,9 +54,8 @@ class RowSums:
         before[:, start] = 0.0
         products, lagged = np.empty((2, len(rows), len(v), len(v)))
         for i, row in enumerate(about):
-            for j in range(len(v)):
-                products[:, i, j] = np.add.reduceat(row * about[j], start)
-                lagged[:, i, j] = np.add.reduceat(row * before[j], start)
+            products[:, i] = np.add.reduceat(row * about, start, axis=1).T
+            lagged[:, i] = np.add.reduceat(row * before, start, axis=1).T
         low, high = np.minimum.reduceat(read, start), np.maximum.reduceat(read, start)
         return RowSums(rows.astype(float), mean.T, products, lagged, low, high)
 
