@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hdcal.diagnosis.result import Diagnosis
     from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.fleets.fleet import fleet
-    from hdcal.fleets.posterior import FleetPosterior
     from hdcal.fleets.result import Fleet
     from hdcal.inference.force_model.residuals import residuals
     from hdcal.inference.model_average import ModelAverage
@@ -45,7 +44,6 @@ _HOMES = {
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Fleet": "fleets.result",
-    "FleetPosterior": "fleets.posterior",
     "Gear": "data.case",
     "Geometry": "data.records",
     "HdcalError": "errors",

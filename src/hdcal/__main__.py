@@ -21,9 +21,10 @@ from hdcal.comparison.command import compare
 from hdcal.design.command import design, study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
-from hdcal.fleets.command import fleet, margin
+from hdcal.fleets.command import fleet
 from hdcal.motion.command import respond
 from hdcal.prediction.bands.command import predict
+from hdcal.prediction.margin.command import margin
 from hdcal.shared_causes.command import causes
 from hdcal.tracking.command import track
 

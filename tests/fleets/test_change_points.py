@@ -53,14 +53,14 @@ def test_the_size_and_the_date_of_a_step_are_within_their_intervals():
         if len(found.steps) == 1:
             step = found.steps[0]
             dated.append(step.before < 10 <= step.after)
-            sized.append(step.size[1] < 2.5 < step.size[2])
+            sized.append(step.size.lo < 2.5 < step.size.hi)
     assert len(dated) > 48
     assert np.mean(dated) >= 0.9
     assert np.mean(sized) >= 0.88
 
 
 def test_the_sizes_of_drifts_and_of_days_are_those_of_the_values():
-    held = [each.drift[1] < 3.75 < each.drift[2] for each in repeated("drift")]
+    held = [each.drift.lo < 3.75 < each.drift.hi for each in repeated("drift")]
     assert np.mean(held) >= 0.88
     found = [each.days_sd for each in repeated("days", size=2.5)]
     assert np.mean(found) == pytest.approx(2.5, rel=0.1)
@@ -72,7 +72,7 @@ def test_two_steps_are_distinguished():
         day, value, variance, time = measured(rng, "none", many=120, dates=30)
         value += 4.0 * ((day >= 10) & (day < 20))
         steps = changes(day, value, variance, time).steps
-        assert [np.sign(step.size[0]) for step in steps] == [1.0, -1.0]
+        assert [np.sign(step.size.median) for step in steps] == [1.0, -1.0]
         held += [
             s.before < at <= s.after for s, at in zip(steps, (10, 20), strict=True)
         ]

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from gear_records import records
 from gear_rows import ordinary
 from scipy.stats import binomtest
 
 from hdcal.fleets.gear_table import QUANTITIES
-from hdcal.fleets.model.population import FittedFleet, fit_population
-from hdcal.fleets.model.sampling import Sampling
-from hdcal.fleets.reading.read_fleet import read_fleet
+from hdcal.fleets.model.population import FittedFleet, Sampling, fit_population
 
 
 def fitted(gears: int, seed: int, **odd: float) -> FittedFleet:
@@ -43,14 +40,6 @@ def test_an_odd_gear_is_flagged_in_its_quantity_alone(quantity: str, size: float
     expected = {name: [] for name in QUANTITIES} | {quantity: [0]}
     assert flagged(found) == expected
     assert not [one for one in found.checks if one.outcome == "failed"]
-
-
-def test_progress_reaches_its_end_without_a_loop():
-    steps = []
-    readings = read_fleet(records(gears=4, runs=1))
-    sampling = Sampling(progress=lambda done, every: steps.append(done / every))
-    assert "loop" not in fit_population(readings, sampling).draws
-    assert steps == sorted(steps) and steps[-1] == 1.0
 
 
 def test_a_gear_far_off_changes_no_other_gear():

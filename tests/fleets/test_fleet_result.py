@@ -1,6 +1,5 @@
 """The result of a fleet: what it says, its table, its files, and what it refuses."""
 
-import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -9,18 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import Hdcal
-from handmade_fleet import fitted, four_gears, handmade
+from handmade_fleet import CHAINS, DRAWS, fitted, four_gears, handmade
 from matplotlib.figure import Figure
 from schema_checks import obeys
 
 import hdcal
 from hdcal.data.prior import Prior
-from hdcal.errors import Finding
+from hdcal.errors import Finding, InputError
 from hdcal.fleets.fleet import fleet_of
 from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.fleets.result import Fleet
+from hdcal.inference.posterior import Posterior
 from hdcal.quantities import TORQUE
-from hdcal.report.table_files import columns_csv, frame_parquet
 
 
 def with_case(**changes) -> FleetReadings:
@@ -60,14 +59,7 @@ def test_several_quantities_are_said_of_one_gear():
     assert "A has its zero at " in fleet.headline and " and has " in fleet.headline
     assert fleet.headline.endswith("1 more is flagged.")
     assert "--specimen A" in str(fleet.next_step)
-    assert fleet.alike == 3
-    fit = fitted(four_gears(), {"D": ["stiffness"]})
-    names = ["apart_percent", "apart_lo", "apart_hi"]
-    fit.gears.loc[fit.gears.index[3], names] = -75.0
-    assert (
-        "D has 25 % of the stiffness of the others"
-        in fleet_of(four_gears(), fit).headline
-    )
+    assert fleet.headline.startswith("3 of 4 gears agree")
 
 
 def test_lots_operators_and_rigs_are_in_the_answer():
@@ -85,7 +77,7 @@ def test_lots_operators_and_rigs_are_in_the_answer():
     sources = {source: force for source, _, _, force in fleet.scatter}
     # One percent of 0.5 mm of some 200 N/mm.
     assert len(sources) == 6 and sources["gears"] == pytest.approx(1.0, rel=0.02)
-    assert not fleet.linked and len(fleet.notes) > len(handmade().notes)
+    assert len(fleet.notes) > len(handmade().notes)
     many = of(with_case(rigs=tuple("ABCD")))
     assert many.rigs == () and any("4 rigs" in note for note in many.notes)
 
@@ -99,6 +91,9 @@ def test_what_the_reader_must_know_is_in_the_notes():
     added = set(fleet.notes) - plain
     assert len(added) == 2 and any("E" in note for note in added)
     assert fleet.left_out[0].gear == "E" and "a force is missing" in fleet.page()
+    frame = fleet.to_frame()
+    assert frame["status"][4] == "left out: data.csv, row 7: a force is missing"
+    assert frame["stiffness_N_per_mm"].isna().tolist() == [False] * 4 + [True]
     priors = {**case.gear.priors, "force_gain": Prior("normal", (0.0, 0.002))}
     gear = replace(case.gear, priors=priors)
     certified = of(with_case(gear=gear))
@@ -128,7 +123,7 @@ def test_the_result_keeps_its_schema_and_shows_itself():
     (odd,) = (
         mark
         for mark in fleet.charts()["gears"].panels[0].marks
-        if mark.label == "flagged in its stiffness"
+        if mark.label == "flagged"
     )
     np.testing.assert_array_equal(odd.y, fleet.to_frame()["stiffness_N_per_mm"][3:])
     assert "D" in fleet.text() and "<svg" not in fleet._repr_html_()
@@ -139,7 +134,6 @@ def test_a_failed_fleet_says_so_everywhere():
     assert fleet.status == "failed" and "1.2" in fleet.reasons[0]
     assert not fleet.flagged and fleet.next_force is None
     assert set(fleet.to_frame()["status"]) == {"failed"}
-    assert all(chart.failed for chart in fleet.charts().values())
     obeys(json.loads(fleet.to_json()), Fleet)
 
 
@@ -157,22 +151,8 @@ def test_a_torsional_spring_is_named_after_torques():
         jsonschema_of["$defs"]["Population"]["properties"].keys()
     )
     assert "K" not in fleet.to_frame() and "zero_N_m" in fleet.to_frame()
-    text = fleet.text() + fleet.margin(0.008).text()
+    text = fleet.text()
     assert "N·m/rad" in text and " N " not in text and "force" not in text
-
-
-def test_gears_csv_and_gears_parquet_keep_hostile_names():
-    names = ("=1+1", "0012", "true", "Größe,\n7")
-    out = {"X": Finding("data.csv", "a force is missing", "state it", 7)}
-    fleet = of(with_case(specimen_labels=names, left_out=out))
-    frame = fleet.to_frame()
-    assert frame["gear"].tolist() == [*names, "X"]
-    assert frame["status"][4].startswith("left out: ")
-    text = columns_csv(dict(frame))
-    assert "'=1+1" in text and "false" in text
-    parquet = pd.read_parquet(io.BytesIO(frame_parquet(frame) or b""))
-    assert parquet["gear"].tolist() == [*names, "X"]
-    assert parquet["stiffness_N_per_mm"].isna().tolist() == [False] * 4 + [True]
 
 
 def line(path: Path) -> Path:
@@ -203,6 +183,21 @@ def test_the_command_leaves_a_folder(hdcal: Hdcal, tmp_path: Path):
     assert [one["gear"] for one in answer["flagged"]] == ["G3"]
     table = pd.read_csv(folder / "gears.csv")
     assert table["gear"][table["flagged"]].tolist() == ["G3"]
+    with pytest.raises(InputError, match="of a fleet"):
+        Posterior.load(folder)
+
+
+def test_the_tree_has_the_draws_of_the_population_and_of_gears_to_come():
+    fleet = handmade()
+    group = fleet.to_datatree()["posterior"]
+    assert dict(group.sizes) == {"chain": CHAINS, "draw": DRAWS}
+    # Draws of the first chain come first.
+    second = fleet.draws["zero"][DRAWS:]
+    np.testing.assert_array_equal(group["zero"].sel(chain=1), second)
+    assert group["zero"].attrs["units"] == "N"
+    predicted = fleet.to_datatree()["predictions"]["stiffness"]
+    interval = fleet.next_gear.stiffness_N_per_mm
+    assert np.quantile(predicted, 0.975) == pytest.approx(interval.hi)
 
 
 @pytest.mark.parametrize(

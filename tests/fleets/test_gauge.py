@@ -44,13 +44,3 @@ def test_lots_belong_to_the_gears_and_operators_and_rigs_to_the_gauge():
     # The mean square of lognormal noise.
     noisy = of(noise_spread=0.5)
     assert noisy.repeatability_N.median == pytest.approx(0.5 * math.exp(0.25))
-
-
-def test_a_gauge_is_graded_by_its_share_of_the_tolerance():
-    # Six sds are 4.69 N.
-    assert of(tolerance=60.0).grade == "good"
-    assert of(tolerance=46.0).grade == of(tolerance=15.7).grade == "acceptable"
-    assert of(tolerance=15.5).grade == "not good enough"
-    draws = {name: np.full(99, value) for name, value in DRAWS.items()}
-    draws["sigma"] = np.linspace(0.1, 2.0, 99)
-    assert gauge_rr(draws, 0.5, 20.0).grade == "not settled"

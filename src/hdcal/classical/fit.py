@@ -15,7 +15,7 @@ from hdcal.data.case import Case, require_case, require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.report.charts.chart_spec import CYCLE, Band, Chart, Line, Mark, Panel, Points
-from hdcal.report.item import INTERVAL, Draws, Interval, Item, Words, quantity
+from hdcal.report.item import INTERVAL, TAILS, Draws, Interval, Item, Words, quantity
 from hdcal.report.result import Result
 
 _TERMS = ("c", "a ω", "b ω²", "d ω³", "e ω⁴", "f ω⁵", "g ω⁶", "h ω⁷", "i ω⁸", "j ω⁹")
@@ -35,11 +35,9 @@ class Polynomial(Item):
     """A fitted polynomial; forces in N, deformations in mm, all as read.
 
     Attributes:
-        coefficients: in rising order of the powers.
         polyfit_order: all coefficients, highest power first, as polyval takes them.
         r2: about the mean force, also without intercept; None for constant forces.
         aicc: of Hurvich and Tsai (1989); None for exact or too few rows.
-        covariance: of the coefficients.
     """
 
     model: str
@@ -57,7 +55,8 @@ class Polynomial(Item):
 
     def curve(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return forces, and half widths of the curve and of one more reading [N]."""
-        rows, t = _columns(x, self.degree, self.intercept), _t(self.dof)
+        rows = _columns(x, self.degree, self.intercept)
+        t = stats.t.ppf(TAILS[2], self.dof)
         variance = np.sum(rows @ self.covariance * rows, axis=1)
         half = t * np.sqrt(variance), t * np.sqrt(variance + self.s_N**2)
         return np.polyval(self.polyfit_order, x), *half
@@ -71,12 +70,9 @@ class Polynomial(Item):
 
 
 class Fits(Result):
-    """Polynomials fitted to the same data.
+    """Polynomials fitted to the same data: of each degree with and without intercept.
 
-    Attributes:
-        fits: for each degree the curve with intercept, then the one without.
-        at_mm: deformation at which forces are compared, as read.
-        case: the data.
+    Forces are compared at the deformation `at_mm` as read.
     """
 
     template = "classical/report.md.j2"
@@ -100,15 +96,13 @@ class Fits(Result):
         """Return readings and curves with their confidence bands."""
         x = np.asarray(self.case.records.deformation)
         grid, marks = np.linspace(min(0.0, x.min()), max(0.0, x.max()), 200), []
-        for place, one in enumerate(self.fits):
-            force, half, _ = one.curve(grid)
-            name, hue = one.model, CYCLE[place % len(CYCLE)]
-            dash = "solid" if one.intercept else "dashed"
+        for place, curve in enumerate(self.fits):
+            force, half, _ = curve.curve(grid)
+            name, hue = curve.model, CYCLE[place % len(CYCLE)]
+            dash = "solid" if curve.intercept else "dashed"
             low, high = force - half, force + half
-            marks += [
-                Band(label=name, x=grid, low=low, high=high, colour=hue),
-                Line(label=name, x=grid, y=force, colour=hue, dash=dash),
-            ]
+            marks.append(Band(label=name, x=grid, low=low, high=high, colour=hue))
+            marks.append(Line(label=name, x=grid, y=force, colour=hue, dash=dash))
         force = np.asarray(self.case.records.force)
         points: Mark = Points(label="readings", x=x, y=force)
         x_axis, y_axis = "deformation as read [mm]", "force as read [N]"
@@ -157,7 +151,7 @@ def fit(
     names = {"name": case.name, "gear": case.gear.name, "sha256": case.data_sha256}
     return Fits(
         data={**names, "rows": len(y)},
-        fits=tuple(fits if at is None else (one.compared_at(at) for one in fits)),
+        fits=tuple(fits if at is None else (curve.compared_at(at) for curve in fits)),
         at_mm=at,
         case=case,
     )
@@ -180,19 +174,14 @@ def fit_polynomial(
     root = inverse / scale ** powers[:, None]
     values, covariance = root @ y, root @ root.T * (squares / dof)
     errors, variation = np.sqrt(np.diag(covariance)), float(y.var() * rows)
+    columns = powers.tolist(), values, errors, stats.t.ppf(TAILS[2], dof) * errors
     return Polynomial(
         model=" + ".join(_TERMS[power] for power in powers),
         degree=degree,
         intercept=intercept,
         coefficients=tuple(
-            Coefficient(
-                power=power,
-                value=value,
-                standard_error=error,
-                lo=value - _t(dof) * error,
-                hi=value + _t(dof) * error,
-            )
-            for power, value, error in zip(powers.tolist(), values, errors, strict=True)
+            Coefficient(power=p, value=v, standard_error=e, lo=v - half, hi=v + half)
+            for p, v, e, half in zip(*columns, strict=True)
         ),
         polyfit_order=(*values[::-1], *([] if intercept else [0.0])),
         s_N=np.sqrt(squares / dof),
@@ -201,10 +190,6 @@ def fit_polynomial(
         aicc=_aicc(rows, squares, unknowns + 1),
         covariance=covariance,
     )
-
-
-def _t(dof: int) -> float:
-    return float(stats.t.ppf(0.5 + INTERVAL / 2.0, dof))
 
 
 def _aicc(rows: int, squares: float, free: int) -> float | None:

@@ -6,12 +6,11 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 
-from hdcal.comparison.charts import stiffness_chart
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.prediction.models import Models, joint_draws, models_of
-from hdcal.report.charts.chart_spec import Chart
+from hdcal.report.charts.chart_spec import ORANGE, Chart, Panel, Points
 from hdcal.report.item import Count, Draws, Interval, Item, Probability, Words, quantity
 from hdcal.report.result import Result
 from hdcal.report.words import label
@@ -54,9 +53,7 @@ class Compared(Item):
 class Comparison(Result):
     """Stiffness of several results, and its difference from that of the first.
 
-    Attributes:
-        results: in the given order; the first one is the reference.
-        stiffness: draws of each result, shape (n, t) [N/mm as read].
+    The draws of the stiffness have the shape (results, draws) [N/mm as read].
     """
 
     template = "comparison/report.md.j2"
@@ -72,7 +69,7 @@ class Comparison(Result):
     @property
     def ranges_differ(self) -> bool:
         """Whether the tested ranges differ by more than a fifth of the widest one."""
-        ends = np.array([one.tested for one in self.results])
+        ends = np.array([result.tested for result in self.results])
         widest = np.max(np.ptp(ends, axis=1))
         return bool(np.max(np.ptp(ends, axis=0)) > _OTHER_RANGE * widest)
 
@@ -84,7 +81,14 @@ class Comparison(Result):
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the stiffness of every result."""
-        return {"results": stiffness_chart(self.results, self.units)}
+        spans = [result.stiffness_N_per_mm for result in self.results]
+        median, low, high = np.transpose([(s.median, s.lo, s.hi) for s in spans])
+        x, label = np.arange(1.0, len(spans) + 1.0), "median and 95 % credible interval"
+        points = Points(label=label, x=x, y=median, low=low, high=high, colour=ORANGE)
+        axis = f"{self.units.stiffness} as read [{self.units.stiffness_unit}]"
+        names = [result.name for result in self.results]
+        panel = Panel(x="result", y=axis, marks=[points], names=names)
+        return {"results": Chart(panels=[panel])}
 
 
 def compare(
@@ -108,7 +112,7 @@ def compare(
         if len(results) < 2:
             words, remedy = "two or more are compared", "Give another result"
             wrong.append(Finding("results", words, remedy))
-        models = {name: models_of(one) for name, one in results.items()}
+        models = {name: models_of(result) for name, result in results.items()}
     cases = {name: each[0].posterior.case for name, each in models.items()}
     kinds = {n: (c.units.displacement, c.gear.reading) for n, c in cases.items()}
     if len(set(kinds.values())) > 1:
@@ -120,21 +124,24 @@ def compare(
     stiffness = np.stack([rng.permutation(draws) for draws in drawn])
     rows = zip(models.items(), stiffness, strict=True)
     return Comparison(
-        results=tuple(_compared(*row, stiffness[0], tolerance) for row in rows),
+        results=tuple(
+            _compared(name, averaged, draws, draws - stiffness[0], tolerance)
+            for (name, averaged), draws in rows
+        ),
         tolerance_N_per_mm=tolerance,
         units=next(iter(cases.values())).units,
         stiffness=stiffness,
     )
 
 
-def _compared(named, draws, first, tolerance: float | None) -> Compared:
-    (name, models), apart = named, draws - first
-    # Those of the noise do not change the stiffness.
+def _compared(name, models, draws, apart, tolerance: float | None) -> Compared:
+    """Return a result, from draws of its stiffness and of its difference."""
+    # Effects on the noise do not change the stiffness.
     effects = {
-        label(e.name)
-        for one in models
-        for e in one.posterior.effects
-        if e.stage != "noise"
+        label(effect.name)
+        for model in models
+        for effect in model.posterior.effects
+        if effect.stage != "noise"
     }
     case = models[0].posterior.case
     beyond = None if tolerance is None else float(np.mean(np.abs(apart) > tolerance))
@@ -144,9 +151,9 @@ def _compared(named, draws, first, tolerance: float | None) -> Compared:
         effects=" and ".join(sorted(effects)) or "none",
         stiffness_N_per_mm=Interval.of(draws),
         difference_N_per_mm=Interval.of(apart),
-        difference_percent=Interval.of(100.0 * apart / first),
+        difference_percent=Interval.of(100.0 * apart / (draws - apart)),
         probability_stiffer=float(np.mean(apart > 0.0) + np.mean(apart == 0.0) / 2.0),
         probability_differs=beyond,
         case=case,
-        has_leftover=any(one.problem.discrepancy is not None for one in models),
+        has_leftover=any(model.problem.discrepancy is not None for model in models),
     )

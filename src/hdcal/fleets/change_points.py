@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
 
 from hdcal.fleets.model.groups import robust_sd
+from hdcal.report.item import TAILS, Interval
 
 # Prior probability of each way.
 WAYS = {"none": 1 / 2, "steps": 1 / 6, "drift": 1 / 6, "days": 1 / 6}
@@ -25,30 +26,25 @@ _LEVELS = 1.5
 _GRID = np.geomspace(0.2, 1.6, 25)
 # Steps expected before the data.
 _EXPECTED = 1.0
-# Probability of intervals.
-_SURE = 0.95
-
-# Median, lower and upper end of an interval.
-Ends = tuple[float, float, float]
 
 
 class LevelStep(NamedTuple):
-    """Change of the level between two dates, by their indices, 97.5 % sure each."""
+    """Change of the level between two dates, by their indices, each 97.5 % certain."""
 
     before: int
     after: int
-    size: Ends
+    size: Interval
 
 
 class Changes(NamedTuple):
     """Probability of each of `WAYS`, and what changes if values change in that way.
 
-    Steps; the drift from the first date to the last; the sd of the levels of dates.
+    The drift is that from the first date to the last, the sd that of levels of dates.
     """
 
     ways: dict[str, float]
     steps: list[LevelStep]
-    drift: Ends
+    drift: Interval
     days_sd: float
 
 
@@ -80,13 +76,9 @@ class _Sums(NamedTuple):
 def changes(
     day: np.ndarray, value: np.ndarray, variance: np.ndarray, time: np.ndarray
 ) -> Changes:
-    """Return whether, how and when values change.
+    """Return whether, how and when values (n,) with errors of a variance change.
 
-    Args:
-        day: index of each value's date, in the order of dates, shape (n,).
-        value: shape (n,).
-        variance: of each value's error, shape (n,).
-        time: of each date, ascending, shape (d,), two or more.
+    `day` is the index of each value's date, `time` of each date ascends, (d,).
     """
     # One wild value moves neither the median nor the grid.
     value = value - np.median(value)
@@ -132,10 +124,7 @@ def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
 
 
 def _segments(sums: _Sums) -> tuple[np.ndarray, float]:
-    """Return log prior and evidence of levels, [scatter, start, stop].
-
-    With the log prior of one level over all dates.
-    """
+    """Return log prior and evidence of levels, [scatter, start, stop], prior of one."""
     scatters, ends = sums.weight.shape
     begin = min(_EXPECTED / (ends - 2), 0.5)
     found = np.full((scatters, ends, ends), -np.inf)
@@ -184,25 +173,22 @@ def _line(sums: _Sums, place: np.ndarray):
 
 
 def _steps(sums: _Sums, share: np.ndarray, ends: list[int]) -> Iterator[LevelStep]:
-    """Yield steps between levels with these ends, each given the other steps.
-
-    `share` is the probability of each scatter.
-    """
+    """Yield steps between levels with these ends, given the share of each scatter."""
     for start, stop in zip(ends, ends[2:], strict=False):
         place = np.arange(start + 1, stop)
         likely = sums.segment([start], place) + sums.segment(place, [stop])
         weight = share[:, None] * softmax(likely, axis=1)
         within = np.cumsum(weight.sum(axis=0))
-        first, last = np.searchsorted(within, [0.5 - 0.5 * _SURE, 0.5 + 0.5 * _SURE])
+        first, last = np.searchsorted(within, [TAILS[0], TAILS[2]])
         old, old_variance = sums.posterior([start], place)
         new, new_variance = sums.posterior(place, [stop])
         size = _interval(weight, new - old, old_variance + new_variance)
         yield LevelStep(int(place[first]) - 1, int(place[last]), size)
 
 
-def _interval(share, mean, variance) -> Ends:
+def _interval(share, mean, variance) -> Interval:
     """Return the interval of a mixture of normals by its mean and its variance."""
     middle = float(np.sum(share * mean))
     sd = np.sqrt(np.sum(share * (variance + (mean - middle) ** 2)))
-    half = float(ndtri(0.5 + 0.5 * _SURE) * sd)
-    return middle, middle - half, middle + half
+    half = float(ndtri(TAILS[2]) * sd)
+    return Interval(median=middle, lo=middle - half, hi=middle + half)

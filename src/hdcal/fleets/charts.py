@@ -11,7 +11,6 @@ from hdcal.report.charts.chart_spec import (
     CYCLE,
     GREY,
     ORANGE,
-    PURPLE,
     Chart,
     Line,
     Mark,
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 # Gears that have their names beside them, and all that are drawn.
 _MOST_NAMED, _MOST_DRAWN = 40, 4000
-# Gears whose readings are shown: flagged ones in colours, others in grey.
+# Gears whose readings are shown, flagged and others.
 _MOST_FLAGGED, _MOST_ORDINARY = 5, 40
 
 
@@ -41,12 +40,7 @@ def gears_chart(fleet: "Fleet") -> Chart:
         shown[np.linspace(0, len(table) - 1, _MOST_DRAWN // 2).astype(int)] = True
         table = table.loc[shown]
     table = table.assign(at=np.arange(1.0, len(table) + 1.0))
-    soft = table["flagged_in"].str.contains("stiffness")
-    kinds = (
-        ("ordinary", ~table["flagged"], BLUE),
-        ("flagged in its stiffness", soft, ORANGE),
-        ("flagged otherwise", table["flagged"] & ~soft, PURPLE),
-    )
+    kinds = ("ordinary", ~table["flagged"], BLUE), ("flagged", table["flagged"], ORANGE)
     centre = fleet.population.stiffness_N_per_mm
     marks: list[Mark] = [
         Span(low=centre.lo, high=centre.hi, label="centre, 95 %", colour=GREY)
@@ -71,7 +65,7 @@ def gears_chart(fleet: "Fleet") -> Chart:
 
 
 def curves_chart(fleet: "Fleet") -> Chart:
-    """Return readings, and their distance from the straight line of the centre."""
+    """Return the distance of readings from the straight line of the centre."""
     case, ratio = fleet.readings.case, fleet.readings.size_ratio
     gear, x, y, warm = (
         np.asarray(getattr(case.records, name))
@@ -87,17 +81,14 @@ def curves_chart(fleet: "Fleet") -> Chart:
     some = np.linspace(0, len(ordinary) - 1, min(len(ordinary), _MOST_ORDINARY))
     shown = [(f"ordinary {fleet.part}s", ordinary.index[some.round().astype(int)])]
     shown += [(row.gear, [row.Index]) for row in flagged.itertuples()]
-    panels = []
-    for label, values in (("", y), ("distance from the centre", y - line)):
-        marks: list[Mark] = [Rule(at=0.0)] if label else []
-        for (name, who), colour in zip(shown, (GREY, *CYCLE[1:]), strict=False):
-            rows = np.isin(gear, who)
-            if rows.any():
-                each = {"x": x[rows], "y": values[rows]}
-                marks.append(Points(label=name, colour=colour, **each))
-        axis = load_axis(case.units, label)
-        panels.append(Panel(x=displacement_axis(case), y=axis, marks=marks))
-    return Chart(panels=panels, share_x=True)
+    marks: list[Mark] = [Rule(at=0.0)]
+    for (name, who), colour in zip(shown, (GREY, *CYCLE[1:]), strict=False):
+        rows = np.isin(gear, who)
+        if rows.any():
+            distance = y[rows] - line[rows]
+            marks.append(Points(label=name, colour=colour, x=x[rows], y=distance))
+    axis = load_axis(case.units, "distance from the centre")
+    return Chart(panels=[Panel(x=displacement_axis(case), y=axis, marks=marks)])
 
 
 def time_chart(fleet: "Fleet") -> Chart:

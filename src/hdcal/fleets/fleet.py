@@ -1,24 +1,20 @@
 """Many gears of one kind: the population, the odd gears, the next gear."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hdcal.data.measurements.bad_gears import cause
 from hdcal.data.plausible import implausible
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Findings
 from hdcal.fleets.gauge import gauge_rr
-from hdcal.fleets.gear_table import (
-    false_discovery_rate,
-    flagged_gears,
-    gear_table,
-    gears_left_out,
-)
+from hdcal.fleets.gear_table import GearLeftOut, flagged_gears, gear_table
 from hdcal.fleets.model.groups import group_offsets
-from hdcal.fleets.model.population import FittedFleet, fit_population
-from hdcal.fleets.model.sampling import Sampling
+from hdcal.fleets.model.population import FittedFleet, Sampling, fit_population
 from hdcal.fleets.next_gear import force_findings, next_force, next_gear
 from hdcal.fleets.over_time import over_time
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
@@ -46,33 +42,27 @@ def fleet(
     skip_bad: bool = False,
     progress: Progress | None = None,
 ) -> Fleet:
-    """Compare many gears of one kind.
-
-    The readings of a mounting lie on a straight line with the stiffness of the gear, a
-    zero of the mounting, and independent noise. Gears scatter about the centre of their
-    population; a few of them are odd and lie farther out.
+    """Compare many gears of one kind: scatter, odd gears, gears to come.
 
     Args:
-        data: a case from `read_case` whose rows name their specimen; a file or a table
-            in memory as `read_case` takes it; a folder with a file, or a folder of
-            data.csv and gear.toml, for each gear; a Parquet file or a folder of them,
-            which are read in batches.
-        gear: as in `read_case`, if no case is given.
-        columns: likewise.
+        data: a case, file or table as `read_case` takes it, with a column specimen; a
+            folder with a file, or a folder of data.csv and gear.toml, for each gear; a
+            Parquet file or a folder of them, which are read in batches.
+        gear: as in `read_case`, as are the columns.
+        columns: by quantity.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain, where NUTS draws.
         draws: kept per chain.
-        seed: of all random numbers; the same seed gives the same answer.
-        deformation: as read, at which the force of gears to come is asked for [mm].
+        seed: of all random numbers.
+        deformation: as read, at which the force of gears to come is predicted [mm].
         limit_force: a capacity to compare that force with, its size [N].
         force_tolerance: width within which the force at the largest deformation, or at
             `deformation`, may lie [N].
-        gears: table of the sizes of each gear, if they differ: a file or a table in
-            memory with a column specimen and columns such as wall_thickness_mm.
-        scheduler: address of a Dask scheduler, whose workers read the files of a
-            Parquet folder.
-        skip_bad: leave out gears with a faulty row or size, or without a slope.
-        progress: called with (steps done, steps in all).
+        gears: file or table of the sizes of each gear, if they differ, with a column
+            specimen and columns such as wall_thickness_mm.
+        scheduler: address of a Dask scheduler that reads a Parquet folder.
+        skip_bad: leave out gears with a fault.
+        progress: called with (quantities done, quantities in all).
 
     Raises:
         InputError: there are too few gears, one is faulty and may not be left out, or
@@ -84,8 +74,7 @@ def fleet(
     readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
     readings = usable(readings, gears, skip_bad=skip_bad)
     with Findings() as wrong:
-        case, given = readings.case, (deformation, limit_force)
-        wrong += force_findings(*given, readings.largest, case.gear.reach, case.units)
+        wrong += force_findings(readings, deformation, limit_force)
     fit = fit_population(readings, Sampling(chains, warmup, draws, seed, progress))
     return fleet_of(readings, fit, deformation, limit_force, force_tolerance)
 
@@ -100,26 +89,29 @@ def fleet_of(
     """Return the result of a fitted population; the arguments are those of `fleet`."""
     case, draws, seed = readings.case, fit.draws, int(fit.settings["seed"])
     largest, reasons = readings.largest, fit.failed
-    needed = None
+    force = None
     if deformation is not None and not reasons:
         how = {"tested": largest, "seed": seed}
-        needed = next_force(draws, deformation, limit_force, **how)
+        force = next_force(draws, deformation, limit_force, **how)
     at = largest if deformation is None else deformation
     table = gear_table(readings, fit)
+    flagged = () if reasons else flagged_gears(table)
+    odd = [p for gear in flagged for p in gear.quantities.values()]
+    left_out = case.left_out.items()
     return Fleet(
         reasons=reasons,
         part="part" if case.gear.theory == SPRING else "gear",
         name=case.name,
         gears=len(table),
         rows=int(readings.sums.rows.sum()),
-        left_out=gears_left_out(readings),
-        flagged=() if reasons else flagged_gears(table),
-        false_discovery_rate=None if reasons else false_discovery_rate(fit),
+        left_out=tuple(GearLeftOut(gear=g, why=cause(w)) for g, w in left_out),
+        flagged=flagged,
+        false_discovery_rate=1.0 - float(np.mean(odd)) if odd else None,
         at_one_size=readings.size_ratio is not None,
         population=_population(fit),
         **_groups(readings, fit),
         next_gear=next_gear(draws, seed),
-        next_force=needed,
+        next_force=force,
         gauge_rr=gauge_rr(draws, at, force_tolerance),
         over_time=() if reasons else over_time(readings, fit),
         seed=seed,
@@ -156,25 +148,21 @@ def _population(fit: FittedFleet) -> Population:
 
 def _groups(readings: FleetReadings, fit: FittedFleet) -> dict[str, Any]:
     """Return the lots, operators and rigs that are distinguished."""
-    case, centre = readings.case, fit.draws["stiffness"]
+    case, draws = readings.case, fit.draws
     lots, operators, rigs = (
-        np.asarray(group_offsets(fit.draws, kind))
-        for kind in ("lot", "operator", "rig")
+        np.asarray(group_offsets(draws, kind)) for kind in ("lot", "operator", "rig")
     )
-    each = {
-        "lots": (centre * (1.0 + lots), case.units.stiffness_unit),
-        "operators": (operators, case.units.load_unit),
-        "rigs": (100.0 * rigs, "%"),
-    }
-    return {
-        kind: tuple(
-            Group(
-                name=name,
-                members=getattr(case, kind).count(name),
-                value=Interval.of(value),
-                unit=unit,
-            )
-            for name, value in zip(getattr(fit.groups, kind), values, strict=False)
+    lots = draws["stiffness"] * (1.0 + lots)
+
+    def of(kind: str, values: np.ndarray, unit: str) -> tuple[Group, ...]:
+        members, names = Counter(getattr(case, kind)), getattr(fit.groups, kind)
+        return tuple(
+            Group(name=name, members=members[name], value=Interval.of(value), unit=unit)
+            for name, value in zip(names, values, strict=False)
         )
-        for kind, (values, unit) in each.items()
+
+    return {
+        "lots": of("lots", lots, case.units.stiffness_unit),
+        "operators": of("operators", operators, case.units.load_unit),
+        "rigs": of("rigs", 100.0 * rigs, "%"),
     }

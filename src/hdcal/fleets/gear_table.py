@@ -5,7 +5,6 @@ from typing import Literal, get_args
 import numpy as np
 import pandas as pd
 
-from hdcal.data.measurements.bad_gears import cause
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.reading.readings import FleetReadings
@@ -17,12 +16,9 @@ QUANTITIES = get_args(QuantityName)
 
 
 class Flagged(Item):
-    """A gear that is not like the others.
+    """A gear with the quantities in which it is flagged, and its probability there.
 
-    Attributes:
-        quantities: in which it is flagged, each with the probability of being odd.
-        apart_percent: distance of the stiffness from the centre, of the lot if lots are
-            distinguished.
+    The centre is that of the lot if lots are distinguished.
     """
 
     gear: Words = quantity("gear")
@@ -97,27 +93,3 @@ def flagged_gears(table: pd.DataFrame) -> tuple[Flagged, ...]:
         )
         for row in found.to_dict("records")
     )
-
-
-def false_discovery_rate(fit: FittedFleet) -> float | None:
-    """Return the expected share of flagged quantities of gears that are ordinary."""
-    each = [1.0 - fit.gears[f"off_{n}"][fit.flagged(n)] for n in QUANTITIES]
-    rate = np.concatenate(each)
-    return float(rate.mean()) if rate.size else None
-
-
-def gears_left_out(readings: FleetReadings) -> tuple[GearLeftOut, ...]:
-    """Return the gears that were left out, each with the reason."""
-    each = readings.case.left_out.items()
-    return tuple(GearLeftOut(gear=gear, why=cause(why)) for gear, why in each)
-
-
-def with_left_out(
-    table: pd.DataFrame, left_out: tuple[GearLeftOut, ...]
-) -> pd.DataFrame:
-    """Return the table with gears that were left out below the others."""
-    if not left_out:
-        return table
-    rows = [{"gear": o.gear, "status": f"left out: {o.why}"} for o in left_out]
-    whole = {"rows": "Int64", "runs": "Int64", "flagged": "boolean"}
-    return pd.concat([table.astype(whole), pd.DataFrame(rows)], ignore_index=True)

@@ -5,7 +5,7 @@ odd in its stiffness, and odd in its zero, with the probabilities of the populat
 belongs to a lot, an operator and a rig that were not measured.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,12 +14,12 @@ from scipy.special import ndtr, ndtri
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.prediction.conditions import far_findings
-from hdcal.quantities import Quantities
 from hdcal.report.item import Interval, Item, Probability, quantity
 
-# Shares of gears to come, and the confidence, of the bounds that are always given.
-CONTENTS, CONFIDENCE = (0.9, 0.99), 0.95
+# Shares of gears to come, and the confidence, of the bounds.
+_CONTENTS, _CONFIDENCE = (0.9, 0.99), 0.95
 
 
 class Bounds(Item):
@@ -50,11 +50,11 @@ class Mixture(NamedTuple):
         """Return the share of members above a limit, for each draw."""
         return np.sum(self.weight * ndtr((self.mean - limit) / self.sd), axis=0)
 
-    def bounds(self, content: float, confidence: float) -> Bounds:
+    def bounds(self, content: float) -> Bounds:
         """Return one-sided bounds of a share above a half, none below zero.
 
-        In the share `confidence` of the draws of the population each bound leaves at
-        least `content` of the members on its side.
+        In the share of the confidence of the draws of the population each bound leaves
+        at least `content` of the members on its side.
         """
 
         def excess(reach, *parts):
@@ -63,14 +63,10 @@ class Mixture(NamedTuple):
 
         ends = np.zeros_like(self.mean), ndtri(content) * self.sd.max(axis=0)
         reach = find_root(excess, ends, args=(*self.weight, *self.sd)).x
-        low = float(np.quantile(self.mean - reach, 1.0 - confidence))
-        high = float(np.quantile(self.mean + reach, confidence))
-        return Bounds(
-            content=content,
-            confidence=confidence,
-            at_least=max(low, 0.0),
-            at_most=high,
-        )
+        low = float(np.quantile(self.mean - reach, 1.0 - _CONFIDENCE))
+        high = float(np.quantile(self.mean + reach, _CONFIDENCE))
+        ends = {"at_least": max(low, 0.0), "at_most": high}
+        return Bounds(content=content, confidence=_CONFIDENCE, **ends)
 
 
 class NextGear(Item):
@@ -81,14 +77,9 @@ class NextGear(Item):
 
 
 class NextForce(Item):
-    """Size of the force of one reading of a gear that was not measured.
+    """Size of the force of one reading of a gear that was not measured, 95 % intervals.
 
-    Attributes:
-        force_N: 95 % predictive interval.
-        bounds: for a share of many such gears, each on a new mounting.
-        probability_exceeded: share of gears to come that need more than the limit, 95 %
-            credible interval.
-        beyond_tested: whether the deformation is larger than all that were read.
+    The deformation may be beyond all that were read.
     """
 
     deformation_mm: float = quantity("deformation as read", "mm")
@@ -130,7 +121,7 @@ def next_gear(draws: Mapping[str, np.ndarray], seed: int) -> NextGear:
     gears = stiffness_of_gears(draws)
     return NextGear(
         stiffness_N_per_mm=Interval.of(gears.sample(seed)),
-        bounds=tuple(gears.bounds(content, CONFIDENCE) for content in CONTENTS),
+        bounds=tuple(map(gears.bounds, _CONTENTS)),
     )
 
 
@@ -141,26 +132,17 @@ def next_force(
     *,
     tested: float,
     seed: int = 0,
-    contents: Sequence[float] = CONTENTS,
-    confidence: float = CONFIDENCE,
 ) -> NextForce:
-    """Return the force of gears to come at a deformation.
+    """Return the force of gears to come at a deformation, of any sign [mm as read].
 
-    Args:
-        draws: of the population by site, shape (d,).
-        deformation: as read, with the sign of the data [mm].
-        limit_force: a capacity, its size [N].
-        tested: largest deformation that was read [mm].
-        seed: of the predictive draws.
-        contents: shares of gears to come, above a half, of bounds with a confidence.
-        confidence: of each bound.
+    The capacity is a size [N]; `tested` is the largest deformation read.
     """
     gears = force_of_gears(draws, deformation)
     above = None if limit_force is None else Interval.of(gears.above(limit_force))
     return NextForce(
         deformation_mm=deformation,
         force_N=Interval.of(gears.sample(seed)),
-        bounds=tuple(gears.bounds(content, confidence) for content in contents),
+        bounds=tuple(map(gears.bounds, _CONTENTS)),
         limit_force_N=limit_force,
         probability_exceeded=above,
         # A deformation is compared with itself as it was written.
@@ -169,16 +151,10 @@ def next_force(
 
 
 def force_findings(
-    deformation: float | None,
-    limit_force: float | None,
-    largest: float,
-    reach: float,
-    units: Quantities,
+    readings: FleetReadings, deformation: float | None, limit_force: float | None
 ) -> list[Finding]:
-    """Return what is wrong with a deformation (None: no force is asked) and a capacity.
-
-    The largest deformation was read; no gear of this radius reaches `reach` [mm].
-    """
+    """Return what is wrong with a deformation, which may be None, and a capacity."""
+    units, reach = readings.case.units, readings.case.gear.reach
     wrong = implausible("limit_force", limit_force, "sigma")
     if deformation is None:
         words, remedy = "has no deformation", "Give `deformation` too"
@@ -186,8 +162,8 @@ def force_findings(
             wrong.append(Finding("limit_force", words, remedy))
         return wrong
     impossible = implausible("deformation", deformation, units.displacement)
-    unit = units.displacement_unit
-    return wrong + (impossible or far_findings(deformation, abs(largest), reach, unit))
+    far = deformation, abs(readings.largest), reach, units.displacement_unit
+    return wrong + (impossible or far_findings(*far))
 
 
 def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -197,12 +173,10 @@ def reading_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
-    """Return the sd of a new lot, operator or rig about the mean of those measured.
-
-    It includes the error of this mean, and is zero without such groups.
-    """
+    """Return the sd of a new lot, operator or rig about the mean of those measured."""
     if f"{kind}_sd" not in draws:
         return np.zeros(1)
+    # The mean of those measured has an error too.
     measured = sum(name.removeprefix(f"{kind}_").isdigit() for name in draws)
     return draws[f"{kind}_sd"] * np.sqrt(1.0 + 1.0 / measured)
 

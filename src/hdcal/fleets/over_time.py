@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, InstanceOf
 
-from hdcal.fleets.change_points import Ends, changes
+from hdcal.fleets.change_points import changes
 from hdcal.fleets.model.groups import group_offsets
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.reading.readings import FleetReadings
@@ -33,11 +33,7 @@ class Change(Item):
     """How one quantity depends on the date of measurement.
 
     Attributes:
-        what: stiffness of gears about the centre of their lot, zero of the mountings of
-            a gear on one day about that of their operator, or noise of gears.
-        dates: number of dates.
-        probability_changed: that it changes at all, 0.5 before the data; from 0.95 on
-            it is `changed`.
+        probability_changed: that it changes at all, 0.5 before the data.
         drift: from the first date to the last, if it is steady.
         days_sd: sd of the levels of days, if they differ from day to day.
         left_out: flagged gears between others, which are no change.
@@ -65,22 +61,18 @@ def over_time(readings: FleetReadings, fit: FittedFleet) -> tuple[Change, ...]:
     if not readings.case.dates:
         return ()
     units = {"stiffness": "%", "zero": readings.case.units.load_unit, "noise": "%"}
-    each = _measured(readings, fit).items()
-    found = (_change(what, units[what], values) for what, values in each)
+    tables = _measured(readings, fit).items()
+    found = (_change(what, units[what], values) for what, values in tables)
     return tuple(change for change in found if change is not None)
 
 
 def _measured(readings: FleetReadings, fit: FittedFleet) -> dict[str, pd.DataFrame]:
-    """Return the stiffness of gears [%], the zero on days, and the noise of gears [%].
-
-    They follow from the lines of each gear alone: the population would shrink them
-    towards each other.
-    """
+    """Return stiffness [%] and noise [%] of gears, and their zeros on days."""
+    # The population would shrink them towards each other: they are of each gear alone.
     case, sums, groups, fits = readings.case, readings.sums, fit.groups, fit.fits
     middle = {name: np.median(values) for name, values in fit.draws.items()}
-    lots, gains, operators = (
-        np.asarray(group_offsets(middle, kind)) for kind in ("lot", "rig", "operator")
-    )
+    kinds = "lot", "rig", "operator"
+    lots, gains, operators = (np.asarray(group_offsets(middle, k)) for k in kinds)
     gears, gain = len(groups.lot), 1.0 + gains
     weight = gain[fits.rig] ** 2 / fits.slope_error
     pull = np.bincount(fits.gear, weight * fits.slope / gain[fits.rig], gears)
@@ -104,26 +96,28 @@ def _measured(readings: FleetReadings, fit: FittedFleet) -> dict[str, pd.DataFra
     mean_x, mean_zero = (np.bincount(at, sums.rows * v) / rows for v in (x, zero))
     error = np.sqrt(fits.widening / rows + mean_x**2 / weight[gear])
 
-    percent = 100.0 / centre
+    percent, every = 100.0 / centre, np.arange(gears)
     stiffness = percent * (slope - centre), percent * noise / np.sqrt(weight)
-    zero = mean_zero, noise[gear] * error
     spread = 100.0 * fits.log_sd, 100.0 / np.sqrt(2.0 * free)
+    zero = mean_zero, noise[gear] * error
+    of_quantity = {
+        "stiffness": (every, first, *stiffness),
+        "zero": (gear, on_day.view("M8[D]"), *zero),
+        "noise": (every, first, *spread),
+    }
     labels = np.array(case.specimen_labels)
     return {
-        "stiffness": _dated(first, labels, fit.flagged("stiffness"), *stiffness),
-        "zero": _dated(
-            on_day.view("M8[D]"), labels[gear], fit.flagged("zero")[gear], *zero
-        ),
-        "noise": _dated(first, labels, fit.flagged("noise"), *spread),
+        name: _dated(labels[of], fit.flagged(name)[of], *columns)
+        for name, (of, *columns) in of_quantity.items()
     }
 
 
-def _dated(day, gear, odd, value, sd) -> pd.DataFrame:
+def _dated(gear, flagged, day, value, sd) -> pd.DataFrame:
     """Return values that have a date, about their median, in the order of the dates."""
-    each = {"gear": gear, "day": day, "value": value, "sd": sd, "odd": odd}
-    table = pd.DataFrame(each).dropna().sort_values("day", kind="stable")
+    columns = {"gear": gear, "day": day, "value": value, "sd": sd, "flagged": flagged}
+    table = pd.DataFrame(columns).dropna().sort_values("day", kind="stable")
     table["value"] -= table["value"].median()
-    odd = np.pad(table.pop("odd").to_numpy(), 1)
+    odd = np.pad(table.pop("flagged").to_numpy(), 1)
     # Several odd ones in a row may be a change.
     table["left_out"] = odd[1:-1] & ~odd[:-2] & ~odd[2:]
     return table.reset_index(drop=True)
@@ -158,16 +152,12 @@ def _change(what, unit: str, values: pd.DataFrame) -> Change | None:
                 # The step may lie within a group.
                 after=str(first[step.before]),
                 before=str(last[step.after]),
-                size=_interval(step.size),
+                size=step.size,
             )
             for step in found.steps
         ),
-        drift=_interval(found.drift),
+        drift=found.drift,
         days_sd=found.days_sd,
         left_out=tuple(values["gear"][values["left_out"]]),
         values=values,
     )
-
-
-def _interval(ends: Ends) -> Interval:
-    return Interval(median=ends[0], lo=ends[1], hi=ends[2])

@@ -9,18 +9,16 @@ import pandas as pd
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.data.measurements.bad_gears import left_out_words
-from hdcal.data.tables.cells import NOT_STATED
 from hdcal.fleets.charts import curves_chart, gears_chart, time_chart
 from hdcal.fleets.gauge import GaugeRR
-from hdcal.fleets.gear_table import Flagged, GearLeftOut, with_left_out
+from hdcal.fleets.gear_table import Flagged, GearLeftOut
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
-from hdcal.fleets.model.groups import rigs_are_linked
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.model.quantities import population_priors
-from hdcal.fleets.next_gear import NextForce, NextGear
+from hdcal.fleets.next_gear import NextForce, NextGear, stiffness_of_gears
 from hdcal.fleets.over_time import Change
-from hdcal.fleets.posterior import FleetMargin, FleetPosterior
 from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.inference.posterior_tree import dataset
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import (
     INTERVAL,
@@ -39,6 +37,7 @@ if TYPE_CHECKING:
 
 # A stiffness so many prior sds from that of the theory is reported.
 _FAR = 3.0
+_IN_NEWTONS = ("zero", "run_offset_sd", "sigma", "loop", "bend", "operator")
 # Gears in the table of a terminal, and of a page; gears.csv has all of them.
 _LISTED, _MOST_LISTED = 25, 2000
 
@@ -46,9 +45,8 @@ _LISTED, _MOST_LISTED = 25, 2000
 class Population(Item):
     """Population of the ordinary gears, per mm as read; 95 % credible intervals.
 
-    Lots, rigs and operators have an sd if they are distinguished. The loop is the force
-    of loading above unloading, the bend how far the middle of the curve lies below its
-    chord.
+    The loop is the force of loading above unloading, the bend how far the middle of the
+    curve lies below its chord.
     """
 
     stiffness_N_per_mm: Interval = quantity("stiffness of the centre", "N/mm")
@@ -65,11 +63,9 @@ class Population(Item):
 
 
 class Group(Item):
-    """A lot, an operator or a rig; 95 % credible intervals.
+    """Stiffness of a lot; zero of an operator or gain of a rig, less the mean.
 
-    Attributes:
-        members: gears of a lot, or mountings.
-        value: stiffness of a lot; zero of an operator or gain of a rig, less the mean.
+    Members are the gears of a lot, or mountings.
     """
 
     name: Words
@@ -82,15 +78,10 @@ class Fleet(Result):
     """Gears of one kind: their population, and the gears that are odd.
 
     Attributes:
-        gears: number of gears, without those left out.
-        rows: readings of these.
         flagged: gears that are odd with a probability of `least_probability_off` or
             more, those in their stiffness first.
-        false_discovery_rate: expected share of ordinary ones among all that is flagged.
         at_one_size: whether gears of several sizes were compared at the gear file's, to
             which then all numbers but those of gears.csv refer.
-        lots: that are distinguished; operators and rigs likewise.
-        next_force: of a gear to come, if a deformation was given.
         readings: of all gears, at the sizes of the gear file.
         gear_table: one row a gear, as in gears.csv.
     """
@@ -133,30 +124,37 @@ class Fleet(Result):
         left_out = (left_out_words(out, len(out) + self.gears),) if out else ()
         return (*left_out, *self.lines("notes"), *map(self.units.say, case.notes))
 
-    @cached_property
-    def posterior(self) -> FleetPosterior:
-        """Draws of the population, which posterior.nc holds."""
-        return FleetPosterior.of(self)
-
     @property
     def draws(self) -> Mapping[str, np.ndarray]:
         """Draws of the population by site, shape (d,)."""
         return self.fit.draws
 
-    def margin(
-        self, deformation: float, limit_force: float | None = None, **shares: float
-    ) -> FleetMargin:
-        """Return the force of gears to come, as `FleetPosterior.margin` does."""
-        return self.posterior.margin(deformation, limit_force, **shares)
-
     def to_frame(self) -> pd.DataFrame:
         """Return the table of gears.csv."""
-        whole = with_left_out(self.gear_table, self.left_out)
-        return whole.rename(columns=self.units.key)
+        table = self.gear_table
+        if self.left_out:
+            rows = pd.DataFrame(
+                {"gear": out.gear, "status": f"left out: {out.why}"}
+                for out in self.left_out
+            )
+            whole = {"rows": "Int64", "runs": "Int64", "flagged": "boolean"}
+            table = pd.concat([table.astype(whole), rows], ignore_index=True)
+        return table.rename(columns=self.units.key)
 
     def to_datatree(self) -> "xr.DataTree":
-        """Return the draws of the population in the groups of ArviZ."""
-        return self.posterior.tree
+        """Return draws of the population and of gears to come, in groups of ArviZ."""
+        import xarray as xr
+
+        fit, chains = self.fit, int(self.fit.settings["chains"])
+        draws = {site: values.reshape(chains, -1) for site, values in fit.draws.items()}
+        units = {site: self.units.unit(_unit(site)) for site in draws}
+        population = dataset(draws, units=units)
+        for kind in ("lot", "operator", "rig"):
+            for place, label in enumerate(getattr(fit.groups, f"{kind}s"), 1):
+                population[f"{kind}_{place}"].attrs["long_name"] = label
+        gears = stiffness_of_gears(fit.draws).sample(self.seed).reshape(chains, -1)
+        groups = {"predictions": dataset({"stiffness": gears}, units=units)}
+        return xr.DataTree.from_dict({"posterior": population} | groups)
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the gears, their readings, and changes with the date."""
@@ -173,24 +171,20 @@ class Fleet(Result):
         return table.head(most).to_dict("records")
 
     @property
-    def scatter(self) -> list[tuple[str, Interval, str, float]]:
+    def scatter(self) -> list[tuple[str, Interval | None, str, float]]:
         """Sources of scatter, their sd with its unit, and the force of one unit [N]."""
-        found, unit = self.population, self.units.load_unit
-        force = found.stiffness_N_per_mm.median * abs(self.gauge_rr.deformation_mm)
+        population, unit = self.population, self.units.load_unit
+        force = population.stiffness_N_per_mm.median
+        force *= abs(self.gauge_rr.deformation_mm)
         sources = (
-            ("lots", found.lot_sd_percent, "%", 0.01 * force),
-            (f"{self.part}s", found.gear_sd_percent, "%", 0.01 * force),
-            ("gains of rigs", found.rig_sd_percent, "%", 0.01 * force),
-            ("zeros of operators", found.operator_sd_N, unit, 1.0),
-            ("zeros of mountings", found.mounting_sd_N, unit, 1.0),
-            ("single readings", found.reading_sd_N, unit, 1.0),
+            ("lots", population.lot_sd_percent, "%", 0.01 * force),
+            (f"{self.part}s", population.gear_sd_percent, "%", 0.01 * force),
+            ("gains of rigs", population.rig_sd_percent, "%", 0.01 * force),
+            ("zeros of operators", population.operator_sd_N, unit, 1.0),
+            ("zeros of mountings", population.mounting_sd_N, unit, 1.0),
+            ("single readings", population.reading_sd_N, unit, 1.0),
         )
-        return [(s, sd, unit, one) for s, sd, unit, one in sources if sd is not None]
-
-    @property
-    def alike(self) -> int:
-        """Number of gears that are not flagged in their stiffness."""
-        return self.gears - sum("stiffness" in one.quantities for one in self.flagged)
+        return [source for source in sources if source[1] is not None]
 
     @property
     def from_theory(self) -> tuple[float, float] | None:
@@ -202,16 +196,18 @@ class Fleet(Result):
         return (ratio, middle) if far else None
 
     @property
-    def linked(self) -> bool:
-        """Whether gears that several rigs measured compare all of the rigs."""
-        return rigs_are_linked(self.readings.sums.gear, self.fit.groups.rig)
+    def groups(self) -> dict[str, tuple[int, int]]:
+        """Numbers of labels and of distinguished groups by kind."""
+        case, kinds = self.readings.case, ("lots", "operators", "rigs")
+        return {
+            kind: (len({*getattr(case, kind)}), len(getattr(self, kind)))
+            for kind in kinds
+        }
 
-    @property
-    def groups(self) -> dict[str, tuple[int, int, bool]]:
-        """Numbers of labels and of distinguished groups, and whether some lack one."""
-        found = {}
-        for kind in ("lots", "operators", "rigs"):
-            labels = getattr(self.readings.case, kind)
-            names = getattr(self.fit.groups, kind)
-            found[kind] = len({*labels}), len(names), NOT_STATED in names
-        return found
+
+def _unit(site: str) -> str:
+    """Return the unit of a site, in N and mm."""
+    if site == "stiffness":
+        return "N/mm"
+    share = site.endswith(("_share", "_ratio")) or site == "noise_spread"
+    return "N" if site.startswith(_IN_NEWTONS) and not share else "1"

@@ -36,18 +36,6 @@ def file_of(path: Path | str) -> Path:
     return path / FILE_NAME if path.is_dir() else path
 
 
-def kind_of(path: Path | str) -> Kind | None:
-    """Return the kind of the posterior of a result folder; None if it is none."""
-    file = file_of(path)
-    if why_not_readable(file, _LARGEST_FILE) is not None:
-        return None
-    try:
-        with xr.open_dataset(file, engine="h5netcdf") as root:
-            return _kind(root.attrs.get(FORMAT))
-    except (OSError, ValueError):
-        return None
-
-
 def content(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, str]) -> bytes:
     """Return the content of a NetCDF file with these groups and root attributes.
 

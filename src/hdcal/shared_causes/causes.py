@@ -1,9 +1,10 @@
 """Which effects many gears have, and how frequent each one is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.cli.processes import run_all
@@ -53,10 +54,6 @@ def causes(
 ) -> FleetCauses:
     """Find which effects many gears have, and how frequent each one is.
 
-    The evidence of each gear is computed as `diagnose` does, with free offsets of its
-    runs. The frequencies of causes follow from the evidence of all gears, and the
-    causes of each gear from both.
-
     Args:
         data: readings of many gears: a case; a table or file as `read_case` takes it,
             with a column `specimen`; or a folder with a file, or a folder, for each.
@@ -82,27 +79,30 @@ def causes(
     check_effect_priors(case, {**EFFECTS, **effects})
     gears, left_out = usable_gears(case, skip_bad=skip_bad)
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
-    tasks = [(each, effects, seed) for each in gears]
-    labels = [each.specimen_labels[0] for each in gears]
-    found = dict(zip(labels, run_all(weigh_gear, tasks, jobs, progress), strict=True))
-    failed = {gear: w for gear, w in found.items() if isinstance(w, Finding)}
+    tasks = [(each, effects, seed) for each in gears.values()]
+    weights = dict(zip(gears, run_all(weigh_gear, tasks, jobs, progress), strict=True))
+    failed = {gear: w for gear, w in weights.items() if isinstance(w, Finding)}
     gears = without_bad(gears, failed, skip_bad=skip_bad)
-    weights = [w for gear, w in found.items() if gear not in failed]
-    return _together(case, gears, weights, {**left_out, **failed}, [*effects], seed)
+    left_out |= failed
+    return _together(case, gears, [weights[g] for g in gears], left_out, effects, seed)
 
 
 def _together(
     case: Case,
-    gears: Sequence[Case],
+    gears: Mapping[str, Case],
     weights: Sequence[Mapping[str, Weight]],
     left_out: Mapping[str, Finding],
-    library: Sequence[str],
+    library: Iterable[str],
     seed: int,
 ) -> FleetCauses:
     """Return frequencies and causes from the evidence of each gear."""
     present = {name for weight in weights for name in weight}
     names = [name for name in (NONE, *library, OUTSIDE) if name in present]
-    gain, prior = _tables(weights, names)
+    evidence = pd.DataFrame([{c: w[c].log_evidence for c in w} for w in weights])
+    log_prior = pd.DataFrame([{c: w[c].log_prior for c in w} for w in weights])
+    # An effect without a prediction for a gear has the evidence of none there.
+    gain = evidence[names].sub(evidence[NONE], axis=0).fillna(0.0).to_numpy()
+    prior = np.exp(log_prior[names].fillna(-np.inf).to_numpy())
     # Log odds are divided as in a diagnosis, where that calibrates probabilities.
     tempered = gain / TEMPERATURE
     alone = prior * np.exp(tempered - tempered.max(axis=1, keepdims=True))
@@ -116,9 +116,9 @@ def _together(
     words = [left_out_words(left_out, len(sets) + len(why))] if why else []
     used = [
         GearCauses(
-            gear=each.specimen_labels[0],
-            lot=each.lots[0] if each.lots else None,
-            rows=len(each.records.force),
+            gear=label,
+            lot=gear.lots[0] if gear.lots else None,
+            rows=len(gear.records.force),
             causes=" / ".join(sets[k]),
             probability=float(drawn.chance[k].max()),
             probability_none=float(drawn.chance[k, names.index(NONE)]),
@@ -126,7 +126,7 @@ def _together(
             probability_alone=float(alone[k].max()),
             status="failed" if reasons else "ok",
         )
-        for k, each in enumerate(gears)
+        for k, (label, gear) in enumerate(gears.items())
     ]
     unused = [GearCauses(gear=g, status=f"left out: {w}") for g, w in why.items()]
     return FleetCauses(
@@ -134,7 +134,7 @@ def _together(
         units=case.units,
         reasons=reasons,
         gears=len(gears),
-        rows=sum(len(each.records.force) for each in gears),
+        rows=sum(len(gear.records.force) for gear in gears.values()),
         left_out=why,
         causes=_shared(names, drawn, sets, gain),
         not_shown=tuple(name for name in library if name not in names),
@@ -148,22 +148,6 @@ def _together(
         checks=checks,
         name=case.name,
     )
-
-
-def _tables(
-    weights: Sequence[Mapping[str, Weight]], names: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return log evidence over none and prior of each cause, shape (g, k).
-
-    An effect without a prediction for a gear has the evidence of none there.
-    """
-    gain, prior = np.zeros((2, len(weights), len(names)))
-    for gear, weight in enumerate(weights):
-        for cause, each in weight.items():
-            place = names.index(cause)
-            gain[gear, place] = each.log_evidence - weight[NONE].log_evidence
-            prior[gear, place] = np.exp(each.log_prior)
-    return gain, prior
 
 
 def _sampled(
@@ -182,49 +166,50 @@ def _sampled(
 
 
 def _shared(
-    names: Sequence[str],
+    names: list[str],
     drawn: Frequencies,
     sets: Sequence[tuple[str, ...]],
     gain: np.ndarray,
 ) -> tuple[SharedCause, ...]:
     """Return the causes over all gears, the most frequent first."""
-    share = drawn.share.reshape(-1, len(names))
-    cause = drawn.cause.reshape(len(share), -1)
+    share, cause = (draws.reshape(-1, draws.shape[-1]) for draws in drawn[:2])
     return tuple(
         SharedCause(
             cause=names[k],
-            gears_named=sum(each == (names[k],) for each in sets),
+            gears_named=sum(causes == (names[k],) for causes in sets),
             gears=Interval.of(np.sum(cause == k, axis=1)),
             share=Interval.of(share[:, k]),
             log_evidence_nat=float(gain[:, k].sum()),
         )
-        for k in map(int, np.argsort(-share.mean(axis=0), kind="stable"))
+        for k in np.argsort(-share.mean(axis=0), kind="stable").tolist()
     )
 
 
 def _confounded(
-    names: Sequence[str], chance: np.ndarray, alone: np.ndarray
+    names: list[str], chance: np.ndarray, alone: np.ndarray
 ) -> tuple[str, ...]:
-    """Return effects that single gears do not separate from something outside."""
+    """Return effects that single gears do not separate from something outside.
+
+    Structure outside the library would be the same in all gears, so that many gears do
+    not separate it from the effect either.
+    """
     if OUTSIDE not in names:
         return ()
     log_alone = np.log(np.maximum(alone, np.finfo(float).tiny))
     odds = log_alone - log_alone[:, [names.index(OUTSIDE)]]
     likeliest = chance.argmax(axis=1)
-    return tuple(
-        names[k]
-        for k in map(int, np.unique(likeliest))
-        if names[k] not in (NONE, OUTSIDE)
-        and np.mean(odds[likeliest == k, k]) < _SUBSTANTIAL
-    )
+    unclear = [
+        k for k in set(likeliest) if odds[likeliest == k, k].mean() < _SUBSTANTIAL
+    ]
+    return tuple(names[k] for k in sorted(unclear) if names[k] not in (NONE, OUTSIDE))
 
 
 def _credible_set(
-    names: Sequence[str], chance: np.ndarray, confounded: Sequence[str]
+    names: list[str], chance: np.ndarray, confounded: Sequence[str]
 ) -> tuple[str, ...]:
     """Return the fewest causes with the credible probability, most probable first."""
     order = np.argsort(-chance, kind="stable")
     many = 1 + int(np.sum(np.cumsum(chance[order]) < _CREDIBLE))
-    found = tuple(names[int(k)] for k in order[:many])
-    add = found[0] in confounded and OUTSIDE not in found
-    return (*found, OUTSIDE) if add else found
+    causes = tuple(names[int(k)] for k in order[:many])
+    add = causes[0] in confounded and OUTSIDE not in causes
+    return (*causes, OUTSIDE) if add else causes

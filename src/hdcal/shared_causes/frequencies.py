@@ -21,12 +21,10 @@ _LEAST = 1e-300
 
 
 class Frequencies(NamedTuple):
-    """Draws of frequencies and causes.
+    """Share of each cause among gears to come (chain, draw, k); cause of each gear.
 
-    Attributes:
-        share: of each cause among gears to come, shape (chain, draw, k).
-        cause: index of the cause of each gear, shape (chain, draw, g).
-        chance: of each cause in each gear, given all gears, shape (g, k).
+    The cause is an index (chain, draw, g); `chance` is the probability of each cause in
+    each gear, given all gears (g, k).
     """
 
     share: np.ndarray
@@ -44,13 +42,8 @@ def sample_frequencies(
 ) -> Frequencies:
     """Draw frequencies and causes in independent chains.
 
-    Args:
-        log_likelihood: of each gear's readings by cause, up to a constant of the gear,
-            shape (g, k).
-        counts: of the Dirichlet prior, in gears, shape (k,).
-        rng: source of randomness.
-        chains: number of chains.
-        draws: of each chain.
+    The likelihood of each gear by cause has the shape (g, k), the counts of the
+    Dirichlet prior, in gears, (k,).
     """
     gears, causes = log_likelihood.shape
     cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)
@@ -85,10 +78,7 @@ def _exchange(
     counts: np.ndarray,
     rng: np.random.Generator,
 ) -> None:
-    """Exchange the gears of two causes with the Metropolis probability.
-
-    Frequencies are integrated out.
-    """
+    """Exchange the gears of two causes, the frequencies integrated out (Metropolis)."""
     one, other = cause[rng.integers(len(cause))], rng.integers(len(counts))
     if one == other:
         return

@@ -22,12 +22,7 @@ _RANGE = (1e-3, 1.0 - 1e-3)
 
 
 class Weight(NamedTuple):
-    """Evidence of one cause.
-
-    Attributes:
-        log_evidence: of the readings of a gear [nat].
-        log_prior: log of the prior probability.
-    """
+    """Log evidence of one cause in the readings of a gear [nat], and its log prior."""
 
     log_evidence: float
     log_prior: float
@@ -38,21 +33,18 @@ class Weight(NamedTuple):
 def weigh_gear(
     gear: Case, library: Mapping[str, type[Effect]], seed: int
 ) -> dict[str, Weight] | Finding:
-    """Return the evidence of each cause, or why there is none.
-
-    The force offsets of runs are integrated out in every hypothesis.
-    """
-    remedy = "Leave the gear out, or diagnose it alone"
+    """Return the evidence of each cause, offsets of runs integrated out, or a fault."""
     try:
         searched = search(gear, library, free_runs=True)
-        found = by_cause(searched, np.random.default_rng(seed))
+        weights = by_cause(searched, np.random.default_rng(seed))
+        if not np.all(np.isfinite([*weights.values()])):
+            raise ArithmeticError("it is not finite")
     except InputError as error:
         return error.findings[0]
     except (ArithmeticError, np.linalg.LinAlgError) as error:
+        remedy = "Leave the gear out, or diagnose it alone"
         return Finding(gear.name, f"its evidence failed ({error})", remedy)
-    if not np.all(np.isfinite([*found.values()])):
-        return Finding(gear.name, "its evidence is not finite", remedy)
-    return found
+    return weights
 
 
 def by_cause(searched: Searched, rng: np.random.Generator) -> dict[str, Weight]:
@@ -89,10 +81,7 @@ def _mean(hypotheses: np.ndarray) -> Weight:
 def _shares(
     searched: Searched, key: Names, rng: np.random.Generator | None
 ) -> dict[str, tuple[float, float]]:
-    """Return each cause's prior share of a hypothesis, and the readings' factor on it.
-
-    Without a source of randomness the shares stay at their prior.
-    """
+    """Return each cause's prior share of a hypothesis, and the factor of readings."""
     effects = [name for name in key if name != OUTSIDE]
     if OUTSIDE not in key or not effects:
         return {name: (1.0 / len(key), 1.0) for name in key} or {NONE: (1.0, 1.0)}

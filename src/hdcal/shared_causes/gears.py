@@ -1,6 +1,6 @@
 """The gears of a fleet, each as a case of its own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.prior import scale_of
 from hdcal.data.reading import read_case
 from hdcal.data.scatter import require_scatter
-from hdcal.errors import Finding, Findings, InputError, quoted
+from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.row_features import take_rows
 
 # Frequencies of causes need several gears.
@@ -36,32 +36,29 @@ def read_gears(data: Any, gear: Any = None, **how: Any) -> Case:
     return read_case(data, gear, **how)
 
 
-def usable_gears(case: Case, *, skip_bad: bool = False) -> tuple[list[Case], dict]:
-    """Return a case for each gear whose readings can show a cause.
-
-    And the finding on each gear that is left out, where bad ones may be.
+def usable_gears(
+    case: Case, *, skip_bad: bool = False
+) -> tuple[dict[str, Case], dict[str, Finding]]:
+    """Return a case for each gear, by its label, and the fault of each gear left out.
 
     Raises:
         InputError: too few gears are left, or a gear cannot be used.
     """
-    gears = [_one_gear(case, index) for index in range(len(case.specimen_labels))]
-    bad = {}
-    for gear in gears:
-        wrong = _unusable(gear)
-        bad |= {gear.specimen_labels[0]: wrong[0]} if wrong else {}
-    gears = without_bad(gears, bad, skip_bad=skip_bad)
-    return gears, {**case.left_out, **bad}
+    gears = {gear: _one_gear(case, k) for k, gear in enumerate(case.specimen_labels)}
+    faults = {label: _fault(gear) for label, gear in gears.items()}
+    bad = {label: fault for label, fault in faults.items() if fault is not None}
+    return without_bad(gears, bad, skip_bad=skip_bad), {**case.left_out, **bad}
 
 
 def without_bad(
-    gears: Sequence[Case], bad: Mapping[str, Finding], *, skip_bad: bool
-) -> list[Case]:
+    gears: Mapping[str, Case], bad: Mapping[str, Finding], *, skip_bad: bool
+) -> dict[str, Case]:
     """Return the gears that are not bad.
 
     Raises:
         InputError: a gear is bad and may not be left out, or too few are left.
     """
-    left = [gear for gear in gears if gear.specimen_labels[0] not in bad]
+    left = {label: gear for label, gear in gears.items() if label not in bad}
     if bad and not skip_bad:
         raise InputError([*bad.values(), offer(bad, len(gears))])
     if len(left) < _FEWEST:
@@ -94,14 +91,16 @@ def _one_gear(case: Case, index: int) -> Case:
     )
 
 
-def _unusable(gear: Case) -> Findings:
+def _fault(gear: Case) -> Finding | None:
     """Return why the readings of a gear cannot show a cause."""
-    wrong, rows, runs = Findings(), len(gear.records.force), len(gear.run_labels)
+    rows, runs = len(gear.records.force), len(gear.run_labels)
     needed = _FEWEST_LEFT + 1 + runs
     if rows < needed:
         words = f"has {rows} rows in {runs} run{'s' if runs > 1 else ''}, too few"
         remedy = f"Read it {needed} times or more, or leave it out"
-        wrong.append(Finding(gear.name, words, remedy))
-    else:
-        wrong.attempt(require_scatter, gear)
-    return wrong
+        return Finding(gear.name, words, remedy)
+    try:
+        require_scatter(gear)
+    except InputError as error:
+        return error.findings[0]
+    return None

@@ -1,13 +1,10 @@
 """The causes of many gears as a result."""
 
-from collections.abc import Mapping
 from typing import Literal
 
-import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.inference.checks import Check
-from hdcal.report.charts.chart_spec import ORANGE, Bars, Chart, Panel, Points
 from hdcal.report.item import (
     INTERVAL,
     Count,
@@ -19,7 +16,6 @@ from hdcal.report.item import (
     Words,
 )
 from hdcal.report.result import Result
-from hdcal.report.words import label
 from hdcal.shared_causes.gear_evidence import NONE
 
 # Less frequent causes are in the JSON alone.
@@ -27,14 +23,11 @@ RARE = 0.01
 
 
 class SharedCause(Item):
-    """One cause over all gears.
+    """One cause, which may be none or outside the library, over all gears.
 
-    Attributes:
-        cause: none, the name of an effect, or outside the library.
-        gears_named: gears in which it alone has a probability of 0.9 or more.
-        gears: number of these gears that have it.
-        share: of gears to come that have it.
-        log_evidence_nat: of the readings of all gears, if each has it, over none.
+    It is named for gears in which it alone has a probability of 0.9 or more. `gears`
+    is the number that have it, `share` that among gears to come. The evidence is that
+    of all gears, if each has it, over none.
     """
 
     cause: EffectName
@@ -50,10 +43,7 @@ class GearCauses(Item):
     Attributes:
         causes: the fewest with a probability of 0.9, the most probable first.
         probability: of the most probable cause, given all gears.
-        probability_none: that the gear has no effect.
         alone: the most probable cause by the readings of this gear alone.
-        probability_alone: of that cause.
-        status: ok, failed, or why the gear is left out.
     """
 
     gear: Words
@@ -80,10 +70,8 @@ class FleetCauses(Result):
         left_out: reason for each gear that is in none of the numbers.
         causes: that were considered, the most frequent first.
         not_shown: effects of the library without a prediction for any gear.
-        confounded: causes that one gear alone does not separate from something outside
-            the library, which many gears do not separate better.
-        each_gear: the rows of gears.csv.
-        checks: of the sampler.
+        confounded: causes that the readings of one gear do not separate from something
+            outside the library.
     """
 
     template = "shared_causes/report.md.j2"
@@ -107,40 +95,14 @@ class FleetCauses(Result):
     name: str = Field(exclude=True)
 
     @property
-    def used(self) -> tuple[GearCauses, ...]:
-        """The gears that are not left out, the most probable effects first."""
-        kept = [each for each in self.each_gear if each.probability_none is not None]
-        return tuple(sorted(kept, key=lambda each: each.probability_none or 0.0))
-
-    @property
     def kinds(self) -> dict[tuple[str, ...], list[str]]:
         """Gears by their causes, the most frequent first."""
-        found: dict[tuple[str, ...], list[str]] = {}
-        for each in self.each_gear:
-            if each.probability_none is not None:
-                found.setdefault(each.kind, []).append(each.gear)
-        return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+        kinds: dict[tuple[str, ...], list[str]] = {}
+        for gear in self.each_gear[: self.gears]:
+            kinds.setdefault(gear.kind, []).append(gear.gear)
+        return dict(sorted(kinds.items(), key=lambda item: -len(item[1])))
 
     @property
     def common(self) -> tuple[SharedCause, ...]:
         """Causes that are frequent enough to be shown."""
         return tuple(c for c in self.causes if c.share.median >= RARE or c.gears_named)
-
-    def make_charts(self) -> Mapping[str, Chart]:
-        """Return the share of each cause among gears to come."""
-        at = np.arange(1.0, len(self.common) + 1.0)
-        shares = [each.share for each in self.common]
-        low, middle, high = 100.0 * np.array([(s.lo, s.median, s.hi) for s in shares]).T
-        panel = Panel(
-            x="",
-            y="share of gears to come [%]",
-            marks=[
-                Bars(label="95 % interval", at=at, low=low, high=high),
-                Points(label="median", x=at, y=middle, colour=ORANGE),
-            ],
-            names=[label(each.cause) for each in self.common],
-            horizontal=True,
-            y_limits=(0.0, 100.0),
-            wide=True,
-        )
-        return {"causes": Chart(panels=[panel])}

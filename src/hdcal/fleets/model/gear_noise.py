@@ -31,11 +31,7 @@ _NEWTON = 8
 
 
 class GearNoise(Sampled):
-    """Degrees of freedom, 0 where nothing is known, and log residual sd of every gear.
-
-    With priors of the sites centre [N], spread (of the logarithm), off_share and
-    off_ratio.
-    """
+    """Degrees of freedom, 0 where none is known, and log residual sd of every gear."""
 
     priors: dict[str, Prior]
     freedom: Float[Array, " g"]
@@ -52,10 +48,7 @@ class GearNoise(Sampled):
 
 
 def noise_posterior(problem: GearNoise, values: Mapping) -> tuple[Cells, Cells]:
-    """Return the posterior of the noise of gears, given one draw of the population.
-
-    Joint log density of residuals, node and kind of a gear, and logarithm of its noise.
-    """
+    """Return log density of residuals, node and kind of gears, and log of the noise."""
     wide = jnp.stack([jnp.ones(()), jnp.sqrt(1.0 + values["off_ratio"] ** 2)])
     spread = values["spread"] * wide
     own = (problem.log_sd - jnp.log(values["centre"]))[:, None]
@@ -115,11 +108,9 @@ def _moments(problem: GearNoise, values: Mapping):
 def gear_noise(
     problem: GearNoise, values: Mapping
 ) -> tuple[NoiseNodes, np.ndarray, np.ndarray]:
-    """Return the noise of each gear, averaged over draws of the population.
+    """Return nodes of the noise of gears, their median [N], and the probability of odd.
 
-    Returns:
-        Nodes of the noise sd; its median, shape (g,) [N]; and the probability of each
-        gear being odd, shape (g,).
+    They are averages over draws of the population, shape (g,).
     """
     middle, sd, off = _moments(problem, values)
     nodes = jnp.exp(middle[:, None] + sd[:, None] * _PLACES)

@@ -50,8 +50,7 @@ class GearQuantity(Sampled):
     All quantities have one structure, so that one compiled program serves them.
 
     Attributes:
-        priors: of the sites spread, off_share and off_ratio, and lot_ratio, rig_ratio
-            and operator_ratio for groups; of _centre, the centre or its logarithm.
+        priors: of _centre, the centre or its logarithm, and of the other sites.
         value: y; the error is c.
         present: 1, or 0 where a gear has no more rows.
         rig: index; 0 where rigs are not distinguished; likewise operator and lot.

@@ -78,10 +78,9 @@ def group_offsets(values: Mapping, kind: str) -> Float[Array, "k ..."]:
 
 
 def distinguished(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
-    """Return the names of groups and the index of the group of each label.
+    """Return the names of groups and the group of each label.
 
-    Both are empty for a single group, for more than `MOST_GROUPS`, and for as many
-    groups as labels.
+    A single group, more than `MOST_GROUPS`, or as many as labels are none.
     """
     names, index = np.unique(np.array(labels, str), return_inverse=True)
     if 1 < len(names) <= min(MOST_GROUPS, len(labels) - 1):
@@ -119,14 +118,6 @@ def gains_of_rigs(
     # A gain about which nothing is known has an sd of one.
     covariance = np.linalg.inv(np.diag(1.0 + known.sum(axis=0)) - shared @ known)
     return grouping(covariance @ pull, covariance)
-
-
-def rigs_are_linked(gear: np.ndarray, rig: np.ndarray) -> bool:
-    """Return whether gears that several rigs measured compare all of the rigs."""
-    gears, size = 1 + int(gear.max()), 2 + int(gear.max()) + int(rig.max())
-    links = np.ones(len(gear)), (gear, gears + rig)
-    links = scipy.sparse.coo_array(links, (size, size))
-    return scipy.sparse.csgraph.connected_components(links, directed=False)[0] == 1
 
 
 def robust_sd(values: np.ndarray) -> float:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hdcal.fleets.reading.mounting_sums import MountingSums
+from hdcal.fleets.reading.readings import MountingSums
 
 # Square of a term beside the terms before it, relative to its whole square, below
 # which the readings do not determine its size.
@@ -27,14 +27,13 @@ _LEAST_CORRELATION, _CLEAR, _MOST_CORRELATION = 0.2, 4.0, 0.99
 
 @dataclass(frozen=True)
 class LineFits:
-    """One entry for each gear on each rig on which it moved; errors are variances / σ².
+    """One entry for each gear, ascending, on each rig on which it moved.
+
+    Errors are variances / σ², widened for the correlation of neighbours.
 
     Attributes:
-        gear: index of the gear, ascending.
-        rig: index of the rig.
-        slope: [N/mm as read]; its error is widened for the correlation, as all are.
-        loop: force of loading above unloading [N]; NaN where it is not known.
-        bend: [N]; NaN where it is not known.
+        slope: [N/mm as read].
+        loop: [N], as the bend; NaN where it is not known.
         freedom: degrees of freedom of the noise of each gear, shape (g,).
         log_sd: logarithm of the residual sd of each gear [N], shape (g,).
         correlation: of neighbouring residuals, pooled; 0 where it is not clear.
@@ -59,12 +58,9 @@ class LineFits:
 
 
 def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFits:
-    """Fit the curves of every gear on every rig.
+    """Fit the curves of every gear on every rig, by the index of that of a mounting.
 
-    Args:
-        sums: of every mounting.
-        rig: index of the rig of each mounting, shape (m,).
-        step: of the force display [N]: readings on an exact line scatter by rounding.
+    Readings on an exact line scatter by the step of the force display [N].
     """
     rigs, gears = 1 + int(rig.max()), 1 + int(sums.gear.max())
     pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)
@@ -105,13 +101,10 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
 
 
 class TermFits(NamedTuple):
-    """Coefficients of three terms of p curves, each beside those before it.
+    """Coefficients of three terms of p curves, each beside those before it, (p, 3).
 
-    Attributes:
-        size: coefficient; NaN where it is not known; shape (p, 3).
-        error: its variance over σ².
-        known: which terms the readings distinguish.
-        residual: the residual as a combination of v, shape (p, 4).
+    With their variance over σ², whether the readings determine them, and the residual
+    as a combination of v, (p, 4).
     """
 
     size: np.ndarray
@@ -127,13 +120,10 @@ class TermFits(NamedTuple):
 def fit_terms(
     products: np.ndarray, order: tuple[int, ...], free: np.ndarray
 ) -> TermFits:
-    """Fit terms in an order, each to what those before it leave.
+    """Fit x, sense and x|x|, by their places in v, each to what those before it leave.
 
-    Args:
-        products: of v, shape (p, 4, 4).
-        order: of x, sense and x|x|, by their places in v. The slope comes first: it is
-            that of the straight line alone.
-        free: degrees of freedom before the fit, shape (p,).
+    The slope comes first: it is that of the straight line alone. Products of v have the
+    shape (p, 4, 4), the degrees of freedom before the fit (p,).
     """
     count = len(products)
     size, error = np.full((2, count, 3), np.nan)
@@ -169,19 +159,14 @@ def _summed(parts: np.ndarray, index: np.ndarray, count: int) -> np.ndarray:
 
 
 def _correlation(follow: np.ndarray, freedom: np.ndarray) -> float:
-    """Return the pooled correlation of neighbours, if it is clear.
-
-    `follow` sums the products of neighbouring residuals over their variance.
-    """
+    """Return the pooled correlation of neighbours from sums of products, if clear."""
     whole = max(float(freedom.sum()), 1.0)
     found = min(float(follow.sum()) / whole, _MOST_CORRELATION)
     return found if found > max(_LEAST_CORRELATION, _CLEAR / np.sqrt(whole)) else 0.0
 
 
 def _swing(sums: MountingSums) -> float:
-    """Return how far x|x| is off its chord in the middle of a usual range [mm²].
-
-    A range L that is passed evenly has the variance L²/12.
-    """
+    """Return how far x|x| is off its chord in the middle of a usual range [mm²]."""
+    # A range L that is passed evenly has the variance L²/12.
     squared = np.minimum(12.0 * sums.products[:, 0, 0] / sums.rows, sums.reach**2)
     return float(np.median(squared)) / 4.0

@@ -5,13 +5,13 @@ is integrated over.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from hdcal.fleets.model.gear_noise import gear_noise
+from hdcal.fleets.model.gear_noise import GearNoise, gear_noise
 from hdcal.fleets.model.gear_quantity import MOST_FALSE, GearQuantity, draw_gears
 from hdcal.fleets.model.groups import group_offsets
 from hdcal.fleets.model.line_fits import LineFits, line_fits
@@ -21,12 +21,31 @@ from hdcal.fleets.model.quantities import (
     noise_problem,
     population_priors,
 )
-from hdcal.fleets.model.sampling import Populations, Sampling
-from hdcal.fleets.reading.mounting_sums import MountingSums
-from hdcal.fleets.reading.readings import FleetReadings
-from hdcal.inference.checks import Check
+from hdcal.fleets.reading.readings import FleetReadings, MountingSums
+from hdcal.inference import laplace
+from hdcal.inference.checks import Check, mixing_checks, sampling_checks
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.importance import MAX_SHAPE, sample_by_importance
+from hdcal.inference.sample import Progress, sample
 from hdcal.report.item import TAILS
 
+# Names of sites in the draws; other sites get the name of the quantity before theirs.
+_SITES = {
+    "stiffness": {
+        "centre": "stiffness",
+        "spread": "specimen_sd",
+        "off_share": "off_share",
+        "off_ratio": "off_ratio",
+    },
+    "zero": {"centre": "zero", "spread": "run_offset_sd"},
+    "noise": {"centre": "sigma"},
+    "loop": {"centre": "loop"},
+    "bend": {"centre": "bend"},
+}
+_GROUPS = ("lot_", "rig_", "operator_")
+# Gears that the population is sampled from, at most; of more a random choice of so
+# many, which determine its scatter to 1 %.
+MOST_SAMPLED = 5_000
 _SHAPES = ("loop", "bend")
 # Fewest gears that tell how much their loops or bends differ.
 _FEWEST = 3
@@ -39,16 +58,87 @@ _GEAR_DRAWS, _IN_ALL, _MOST_DRAWN = 400, 1_000_000, 20_000_000
 
 
 @dataclass(frozen=True)
+class Sampling:
+    """Settings of the samplers, as `hdcal.fleet` has them."""
+
+    chains: int = 4
+    warmup: int = 500
+    draws: int = 800
+    seed: int = 0
+    progress: Progress | None = None
+
+    @property
+    def settings(self) -> dict[str, int]:
+        """Settings that a result states."""
+        names = ("seed", "chains", "warmup", "draws")
+        return {name: getattr(self, name) for name in names}
+
+
+class Populations:
+    """Draws by site and checks of the populations that were sampled so far."""
+
+    def __init__(self, sampling: Sampling, gears: int, names: Sequence[str]):
+        rng = np.random.default_rng(sampling.seed)
+        self._sampling, self._names = sampling, names
+        self._chosen = np.sort(rng.permutation(gears)[:MOST_SAMPLED])
+        self.draws: dict[str, np.ndarray] = {}
+        self.checks: list[Check] = []
+
+    def sample(
+        self,
+        name: str,
+        problem: GearNoise | GearQuantity,
+        start: Mapping[str, float],
+        many: int,
+    ) -> dict[str, np.ndarray]:
+        """Sample the population of a quantity from a start, and return many draws."""
+        how, problem = self._sampling, problem.some(self._chosen)
+        fixed = {n for n, prior in problem.priors.items() if prior.family == "fixed"}
+        start = {site: value for site, value in start.items() if site not in fixed}
+        whitening = laplace.fit(problem, start)
+        size: dict[str, Any] = {"chains": how.chains, "draws": how.draws}
+        cheap = sample_by_importance(problem, whitening, how.seed, **size)
+        if cheap is not None:
+            values = cheap.values
+            checks = (
+                *mixing_checks(_mixing(values, fixed), how.chains),
+                Check(
+                    "proposals cover the posterior (Pareto k)",
+                    "passed" if cheap.shape <= MAX_SHAPE else "failed",
+                    f"the largest weights have a Pareto k of {cheap.shape:.2f}, "
+                    f"allowed {MAX_SHAPE}",
+                ),
+            )
+        else:
+            found = sample(problem, whitening, how.seed, warmup=how.warmup, **size)
+            # A run may be longer than asked for: all quantities have as many draws.
+            longer = next(iter(found.values.values())).shape[1]
+            kept = np.linspace(0, longer - 1, how.draws).round().astype(int)
+            values = {site: v[:, kept] for site, v in found.values.items()}
+            checks = sampling_checks(found, _mixing(found.values, fixed))
+        self.checks += [replace(c, name=f"{name}: {c.name}") for c in checks]
+        flat = {site: value.reshape(-1) for site, value in values.items()}
+        for site, value in flat.items():
+            plain = site if site.startswith(_GROUPS) else f"{name}_{site}"
+            self.draws[_SITES[name].get(site, plain)] = value
+        if how.progress is not None:
+            how.progress(1 + self._names.index(name), len(self._names))
+        step = -(-how.chains * how.draws // many)
+        return {site: value[::step] for site, value in flat.items()}
+
+
+def _mixing(values: Mapping[str, np.ndarray], fixed: set[str]):
+    return mixing({name: v for name, v in values.items() if name not in fixed})
+
+
+@dataclass(frozen=True)
 class FittedFleet:
-    """Posterior of a population and of its gears.
+    """Posterior of a population and of its gears, at the sizes of the gear file.
 
     Attributes:
         draws: of the population by site, shape (d,).
-        gears: one row a gear: stiffness, stiffness_lo, stiffness_hi [N/mm as read],
-            apart_percent, apart_lo, apart_hi, distance_sd, zero_N, noise_sd_N, loop_N,
-            bend_N, and off_stiffness, … off_bend, the probability of being odd.
-        stiffness: draws of each gear at the sizes of the gear file, shape (t, g)
-            [N/mm as read].
+        gears: one row a gear, its columns as in gears.csv.
+        stiffness: draws of each gear, shape (t, g) [N/mm as read].
         unit: stiffness at K = 1 [N/mm as read].
     """
 
@@ -146,12 +236,9 @@ def _zeros(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the zero of each mounting beside the line of its gear on its rig.
 
-    Mountings of a gear on one rig share the error of the slope. On several rigs it
-    counts as that of the mounting, which it is with one mounting on each.
-
-    Returns:
-        Zeros, shape (m,) [N]; variance of their errors over σ², shape (m,); and of the
-        errors that the mountings of a gear share, shape (g,).
+    With the variance over σ² of its error, (m,), and of the errors that the mountings
+    of a gear share, (g,). Mountings of a gear on one rig share the error of the slope;
+    on several rigs it counts as that of the mounting, which it is with one on each.
     """
     rigs = 1 + int(rig.max())
     pairs, pair = np.unique(sums.gear * rigs + rig, return_inverse=True)

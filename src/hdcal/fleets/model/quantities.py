@@ -19,14 +19,13 @@ from hdcal.fleets.model.groups import (
     robust_sd,
 )
 from hdcal.fleets.model.line_fits import LineFits
-from hdcal.fleets.reading.mounting_sums import MountingSums
+from hdcal.fleets.reading.readings import MountingSums
 from hdcal.inference.force_model.priors import problem_priors
 
 # By judgement one gear in ten is odd in its stiffness, one in a hundred in another
 # quantity, some six times as far out as ordinary gears. The noise of gears on one rig
-# differs by 1 to 100 %. Lots scatter about as gears of one lot do, seldom a tenth of it
-# or seven times as far; zeros of operators as those of mountings, and gains of rigs as
-# gears.
+# differs by 1 to 100 %. Lots and gains of rigs scatter about as gears of one lot do,
+# seldom a tenth of it or seven times as far; zeros of operators as those of mountings.
 ODD_STIFFNESS, ODD = Prior("beta", (1.0, 9.0)), Prior("beta", (1.0, 99.0))
 ODD_RATIO = Prior("lognormal", (6.0, 0.7))
 NOISE_SPREAD = Prior("lognormal", (0.1, 1.2))
@@ -47,8 +46,7 @@ Quantity = tuple[GearQuantity, dict[str, float]]
 class FleetGroups:
     """Names of lots, rigs and operators, none where they are not distinguished.
 
-    With the index of the lot of each gear, shape (g,), and of the rig and the operator
-    of each mounting, shape (m,).
+    With the index of the lot of each gear, and of rig and operator of each mounting.
     """
 
     lots: list[str]
@@ -62,15 +60,12 @@ class FleetGroups:
     def of(cls, case: Case, run: np.ndarray) -> "FleetGroups":
         """Return the groups of a case; run is that of each mounting, shape (m,)."""
         gear = np.arange(len(case.specimen_labels))
-        each: list[Any] = []
-        for labels, member in (
-            (case.lots, gear),
-            (case.rigs, run),
-            (case.operators, run),
-        ):
+        columns: list[Any] = []
+        kinds = (case.lots, gear), (case.rigs, run), (case.operators, run)
+        for labels, member in kinds:
             names, index = distinguished(labels)
-            each += [names, index[member] if names else np.zeros(len(member), int)]
-        return cls(*each)
+            columns += [names, index[member] if names else np.zeros(len(member), int)]
+        return cls(*columns)
 
 
 def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
@@ -114,9 +109,8 @@ def noise_problem(
 class Problems:
     """Problems of the quantities of one fleet, all of one structure.
 
-    Attributes:
-        noise: of each gear, with its median `noise_sd`, shape (g,) [N].
-        slots: most rows of a gear.
+    The noise of each gear has its median in `noise_sd`, (g,) [N]; a gear has rows in so
+    many slots at most.
     """
 
     groups: FleetGroups
@@ -156,17 +150,11 @@ class Problems:
         start["_centre"] = float(np.log(middle * (1.0 + start["_centre"])))
         return problem, start
 
-    def zero(
-        self,
-        sums: MountingSums,
-        zeros: np.ndarray,
-        error: np.ndarray,
-        shared: np.ndarray,
-    ) -> Quantity:
+    def zero(self, sums: MountingSums, zeros, error, shared) -> Quantity:
         """Return the population of the zeros (m,), which scatter between mountings [N].
 
-        With the variance of their errors over σ², (m,), and of the error that all zeros
-        of a gear share, (g,).
+        The variances over σ² are those of their errors, (m,), and of the error that all
+        zeros of a gear share, (g,).
         """
         operator, rest = self.groups.operator, zeros
         found: dict[str, Grouping] = {}
@@ -181,7 +169,7 @@ class Problems:
         columns = {"value": zeros, "error": error, "operator": operator}
         how = {"shared": shared, "by_row": 1.0}
         problem = self._problem(own, sums.gear, columns, found, **how)
-        return problem, _start(rest, self._usual_noise)
+        return problem, _start(rest, float(np.median(self.noise_sd)))
 
     def shape(self, fits: LineFits, name: str, largest_force: float) -> Quantity:
         """Return the population of the loop or the bend, by its name."""
@@ -191,11 +179,7 @@ class Problems:
         own = {"_centre": centre, "spread": spread, "off_share": ODD}
         columns = {"value": value[known], "error": error[known]}
         problem = self._problem(own, fits.gear[known], columns, {})
-        return problem, _start(value[known], self._usual_noise)
-
-    @property
-    def _usual_noise(self) -> float:
-        return float(np.median(self.noise_sd))
+        return problem, _start(value[known], float(np.median(self.noise_sd)))
 
     def _problem(
         self,
@@ -244,10 +228,7 @@ class Problems:
 
 
 def _start(values: np.ndarray, unit: float) -> dict[str, float]:
-    """Return centre, scatter and share of odd gears, roughly.
-
-    A scatter is noticeable in a unit.
-    """
+    """Return rough centre, scatter (clear in a unit) and share of odd gears."""
     middle = float(np.median(values))
     sd = robust_sd(values - middle)
     far = np.sum(np.abs(values - middle) > _FAR * sd)

@@ -11,7 +11,6 @@ import pandas as pd
 from hdcal.data.case import Case, Gear
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear_file.schema import size_faults
-from hdcal.data.measurements.bad_gears import bad_gears
 from hdcal.data.plausible import implausible
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import has_comma, read_numbers
@@ -30,18 +29,15 @@ _SIZE_WORDS = ("wall", "radius", "length", "load_height", "diameter", "thickness
 def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]:
     """Return what the sizes of gears make of their stiffness.
 
-    Args:
-        source: a CSV file, a workbook, or a table in memory, with a column that names
-            the gear, and columns named as `SIZES`; others are those of the gear file.
-        case: of the gears.
+    The source is a file or table with a column that names the gear, and columns named
+    as `SIZES`; other sizes are those of the gear file.
 
     Returns:
         Stiffness of the sizes of each gear over that of the sizes in the gear file,
-        NaN where it is not known, shape (g,); and gears without a size, or with one
-        that cannot be, each with its fault.
+        NaN where it is not known, shape (g,); and the gears without a size.
 
     Raises:
-        InputError: holds what is wrong with the table as a whole.
+        InputError: the table or a size is wrong.
     """
     in_memory = is_frame(source)
     if not in_memory and not isinstance(source, str | Path):
@@ -54,23 +50,21 @@ def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]
             findings.refuse(words, "Name one, as `gear` FILE.toml")
         table, _ = read_source(source, findings)
         places, specimen = _columns(table, case, findings)
-    labels, faults = table.grid.texts(specimen), FileFindings(name)
-    sizes = {
-        header.removesuffix("_mm"): _numbers(table, header, place, faults)
-        for header, place in places.items()
-    }
-    faults.add_rows(_at_odds(table, sizes, case.gear))
-    words = "its gear has a row already", "Keep the one that is right"
-    twice = pd.Series(labels).duplicated().to_numpy()
-    faults.add_rows((int(row), *words) for row in table.rows[twice])
-    bad = bad_gears(faults, table.rows, labels)
-    row_of = {label: row for row, label in enumerate(labels) if label not in bad}
+        sizes = {
+            header.removesuffix("_mm"): _numbers(table, header, place, findings)
+            for header, place in places.items()
+        }
+        findings.add_rows(_at_odds(table, sizes, case.gear))
+        labels = pd.Series(table.grid.texts(specimen))
+        words = "its gear has a row already", "Keep the one that is right"
+        twice = labels.duplicated().to_numpy()
+        findings.add_rows((int(row), *words) for row in table.rows[twice])
+    row_of = {label: row for row, label in enumerate(labels)}
     rows = [row_of.get(gear, -1) for gear in case.specimen_labels]
-    each = {size: np.append(column, np.nan)[rows] for size, column in sizes.items()}
+    stated = {size: np.append(column, np.nan)[rows] for size, column in sizes.items()}
     missing = Finding(name, "has no row in the table of sizes", "Add its sizes")
-    unsized = [gear for gear in case.specimen_labels if gear not in row_of]
-    faulty = {gear: bad.get(gear, missing) for gear in unsized}
-    return np.broadcast_to(_ratio(each, case.gear), len(rows)), faulty
+    unsized = {gear: missing for gear in case.specimen_labels if gear not in row_of}
+    return np.broadcast_to(_ratio(stated, case.gear), len(rows)), unsized
 
 
 def _columns(
@@ -88,8 +82,8 @@ def _columns(
     known = case.columns.get("specimen")
     named = [
         place
-        for place, header in enumerate(table.headers)
-        if header == known or parse_header(header).quantity == "specimen"
+        for place, h in enumerate(table.headers)
+        if h == known or parse_header(h).quantity == "specimen"
     ]
     if len(named) != 1:
         words = "no column, or more than one, names the gear of a row"
@@ -122,8 +116,8 @@ def _at_odds(
     if "length" in sizes and others["load_height"] == others["length"]:
         del others["load_height"]
     for index, row in enumerate(table.rows):
-        each = {name: float(column[index]) for name, column in sizes.items()}
-        for name, words, remedy in size_faults(others | each):
+        stated = {name: float(column[index]) for name, column in sizes.items()}
+        for name, words, remedy in size_faults(others | stated):
             yield int(row), f"{name}_mm: {words}", remedy
 
 

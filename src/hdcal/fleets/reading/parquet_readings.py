@@ -17,12 +17,16 @@ from hdcal.data.measurements.parquet import Parquet, read_batches
 from hdcal.data.measurements.screened import asked_range, screened
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.errors import Finding, InputError
-from hdcal.fleets.reading.mounting_sums import RowSums, reading_vectors
-from hdcal.fleets.reading.readings import FleetReadings, modulus_left, readings_of
+from hdcal.fleets.reading.readings import (
+    FleetReadings,
+    RowSums,
+    modulus_left,
+    reading_vectors,
+    readings_of,
+)
 from hdcal.fleets.reading.record_faults import irregular
 from hdcal.screening.result import Observation
 from hdcal.screening.screen import screen
-from hdcal.screening.turning_points import TURN_MOST
 
 _LOST = "start again: reading takes a small part of the time"
 # First rows that are kept.
@@ -37,8 +41,8 @@ _SAMPLE = 10
 class BatchSums:
     """Sums of the rows that were read so far, by the labels of rows in a batch.
 
-    With the first rows, the observations of the screening and their files, and the
-    gears with a faulty cell or about whose record screening asks.
+    With the first rows, the observations of the screening and their files, and gears
+    with a fault.
     """
 
     source: Parquet
@@ -88,7 +92,7 @@ class BatchSums:
         each = each.assign(row=each.index)
         x, force, gear = read["deformation"], read["force"], self.source.gear
         warm = read.get("temperature", gear.reference_temperature)
-        sense = np.ones(len(x)) if hidden else senses(x, index)
+        sense = derive_motion(x, index, hidden=hidden).sense
         sense = sense_at_turns(sense, x, force, index)
         v = reading_vectors(x * modulus_left(gear, warm), sense, force)
         return each, index, v, RowSums.of(index, v, x)
@@ -161,32 +165,6 @@ class BatchSums:
         return replace(case, records=replace(case.records, run=run, specimen=gear))
 
 
-def senses(x: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Return the sense of the last movement of each row, as `derive_motion` does.
-
-    Records without noise in the deformation, which are most, are looked at all at once.
-    The index is that of the record of each row, shape (n,).
-    """
-    order = np.argsort(index, kind="stable")
-    read, record = x[order], index[order]
-    begins = np.diff(record, prepend=-1) != 0
-    step = np.where(begins, 0.0, np.diff(read, prepend=0.0))
-    signs = pd.Series(np.where(step == 0.0, np.nan, np.sign(step)))
-    signs = signs.groupby(record).ffill().groupby(record).bfill()
-    sense = np.empty(len(x))
-    sense[order] = signs.fillna(1.0)
-    # Records with movements that noise could hide.
-    first = begins | (np.diff(sense[order], prepend=0.0) != 0.0)
-    travel = np.bincount(np.cumsum(first) - 1, np.abs(step))
-    rows = np.flatnonzero(begins)
-    span = np.maximum.reduceat(read, rows) - np.minimum.reduceat(read, rows)
-    small = travel < TURN_MOST * span[record[first]]
-    hard = (np.bincount(record[first], small) > 0.0)[index]
-    if hard.any():
-        sense[hard] = derive_motion(x[hard], index[hard]).sense
-    return sense
-
-
 def _irregular(
     read: Measurements, index: np.ndarray, v: np.ndarray, sums: RowSums
 ) -> np.ndarray:
@@ -212,10 +190,7 @@ def parquet_readings(
 ) -> tuple[FleetReadings, BatchSums]:
     """Return the readings of all files, and their sums.
 
-    Args:
-        source: the files.
-        scheduler: address of a Dask scheduler, whose workers read the files instead;
-            they find them under the same names.
+    The workers of a Dask scheduler find the files under the same names.
 
     Raises:
         InputError: a file cannot be read, or nobody answers or works at the address.
@@ -239,7 +214,7 @@ def parquet_readings(
 
 
 def file_sums(place: int, file: str, source: Parquet) -> tuple[int, BatchSums]:
-    """Return the sums of one file, and its place among all."""
+    """Return the sums of one file with its place among all."""
     sums = BatchSums(source)
     for batch in read_batches(source, file, skip_bad=True):
         sums.add(batch)

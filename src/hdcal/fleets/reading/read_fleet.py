@@ -1,7 +1,4 @@
-"""Reading of many gears from any source, and the faults of their records.
-
-Gears with a fault are refused, or left out whole.
-"""
+"""Reading of many gears from any source, without those whose record has a fault."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -42,7 +39,7 @@ _FAULTS = {
 # Notes on records that are listed.
 _LISTED = 20
 # From fewer gears next to nothing is known about how much gears differ.
-FEWEST = 3
+_FEWEST = 3
 
 
 def read_fleet(
@@ -57,17 +54,8 @@ def read_fleet(
 ) -> FleetReadings:
     """Return the readings of many gears; gears with a fault are named in its `faults`.
 
-    Args:
-        data: a case; a file, folder or table in memory as `read_case` takes it; a
-            folder with a file or a case for each gear; a Parquet file, or a folder of
-            them, which are read in batches.
-        gear: as in `read_case`, as are all that follow; a case has its own.
-        encoding: of text files.
-        sheet: of a workbook.
-        specimen: label of the only one that is read.
-        scheduler: address of a Dask scheduler, whose workers read the files of a
-            Parquet folder.
-        how: columns and range.
+    The data are those of `hdcal.fleet`, all else but the Dask scheduler is as in
+    `read_case`.
 
     Raises:
         InputError: holds what is wrong with the data as a whole.
@@ -107,12 +95,8 @@ def _with_faults(
 ) -> FleetReadings:
     """Return readings with the faults of their gears, and notes on other findings.
 
-    What more than half of the gears show is of the test, and no fault of a gear.
-
-    Args:
-        readings: of all gears that could be read.
-        left_out: those that could not.
-        observed: files and observations of the screening.
+    What more than half of the gears show is of the test, and no fault of a gear. Some
+    gears could not be read; screening observed the others in their files.
     """
     case = readings.case
     showing: dict[str, set[str]] = defaultdict(set)
@@ -140,11 +124,6 @@ def usable(
 ) -> FleetReadings:
     """Return the readings of gears without a fault, at the sizes of the gear file.
 
-    Args:
-        readings: of all gears.
-        gears: table of the sizes of each gear, if they differ.
-        skip_bad: leave out gears with a fault.
-
     Raises:
         InputError: a gear has a fault and may not be left out, fewer than three are
             left, none scatters about its line, or the table cannot be read.
@@ -165,10 +144,13 @@ def usable(
         bad |= unlike
         readings = readings.without(unlike)
         left = len(readings.case.specimen_labels)
-        if bad and (left < FEWEST or not skip_bad):
+        if bad and (left < _FEWEST or not skip_bad):
             wrong += _of_gears(bad)
-        if left < FEWEST:
-            wrong.append(_too_few(left, len(bad), readings.case.name))
+        if left < _FEWEST:
+            words = f"of {many} gears {left} can be used: how much gears differ takes "
+            words += f"{_FEWEST} or more"
+            remedy = "Correct the others; `columns` specimen=HEADER names the gear"
+            wrong.append(Finding(readings.case.name, words, remedy))
         elif bad and not skip_bad:
             wrong.append(offer(bad, many))
     require_scatter(readings.case)
@@ -182,23 +164,13 @@ def usable(
     return replace(readings, case=case, sizes=None)
 
 
-def _too_few(left: int, bad: int, name: str) -> Finding:
-    words = f"{left} gear{'' if left == 1 else 's'}: how much gears differ takes "
-    words += f"{FEWEST} or more"
-    if bad:
-        words = f"of {left + bad} gears {left} can be used. {words}"
-        return Finding(name, words, "Correct what is wrong with the others")
-    remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-    return Finding(name, words, remedy)
-
-
 def _of_gears(bad: Mapping[str, Finding]) -> list[Finding]:
     """Return the faults of gears, each with its name."""
-    each = [
+    faults = [
         replace(why, problem=f"gear {quoted(gear)}: {why.problem}")
         for gear, why in bad.items()
     ]
-    if more := len(each[LISTED:]):
+    if more := len(faults[LISTED:]):
         words = f"and {more} more gear{' has' if more == 1 else 's have'} a fault"
-        each[LISTED:] = [Finding(each[0].file, words, "Correct these too")]
-    return each
+        faults[LISTED:] = [Finding(faults[0].file, words, "Correct these too")]
+    return faults

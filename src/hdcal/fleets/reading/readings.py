@@ -1,7 +1,8 @@
 """Readings of many gears, as sums over each mounting."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import Self
 
 import jax
 import numpy as np
@@ -10,9 +11,114 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
 from hdcal.errors import Finding
-from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums, reading_vectors
 from hdcal.inference import distributions
 from hdcal.screening.local_fit import least_step
+
+
+@dataclass(frozen=True)
+class RowSums:
+    """Sums over p sets of rows, of the vector v = (x, sense, x|x|, y) of every row.
+
+    x is the deformation as read times the modulus that is left [mm], the sense that of
+    the movement (1 loading, −1 unloading), y the force [N].
+
+    Attributes:
+        rows: number of rows, shape (p,).
+        mean: of v, shape (p, 4).
+        products: sum of (v − mean)(v − mean)ᵀ, shape (p, 4, 4).
+        lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over successive rows.
+        low: smallest deformation, as `high` is the largest, shape (p,) [mm].
+    """
+
+    rows: np.ndarray
+    mean: np.ndarray
+    products: np.ndarray
+    lagged: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def of(cls, index: np.ndarray, v: np.ndarray, deformation: np.ndarray) -> "RowSums":
+        """Sum rows v, (4, n), of deformations as read, in the order they were taken.
+
+        The index is that of the set of each row, 0, 1, … without a gap.
+        """
+        order = np.argsort(index, kind="stable")
+        rows = np.bincount(index)
+        start = np.cumsum(rows) - rows
+        v, read = v[:, order], deformation[order]
+        mean = np.add.reduceat(v, start, axis=1) / rows
+        about = v - np.repeat(mean, rows, axis=1)
+        before = np.zeros_like(about)
+        before[:, 1:] = about[:, :-1]
+        before[:, start] = 0.0
+        products, lagged = np.empty((2, len(rows), len(v), len(v)))
+        for i, row in enumerate(about):
+            products[:, i] = np.add.reduceat(row * about, start, axis=1).T
+            lagged[:, i] = np.add.reduceat(row * before, start, axis=1).T
+        low, high = np.minimum.reduceat(read, start), np.maximum.reduceat(read, start)
+        return RowSums(rows.astype(float), mean.T, products, lagged, low, high)
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Largest deformation without its sign, shape (p,) [mm]."""
+        return np.maximum(np.abs(self.low), np.abs(self.high))
+
+    def where(self, kept: np.ndarray) -> Self:
+        """Return some sets, by a mask or by indices."""
+        return type(self)(*(getattr(self, each.name)[kept] for each in fields(self)))
+
+    def joined(self, index: np.ndarray) -> "RowSums":
+        """Return the sums of wholes whose parts these are, in the order of the rows.
+
+        The index is that of the whole of each part, 0, 1, … without a gap. Successive
+        rows of different parts are left out of `lagged`.
+        """
+        order = np.argsort(index, kind="stable")
+        parts, whole = self.where(order), index[order]
+        start = np.searchsorted(whole, np.arange(1 + whole.max()))
+        rows, each = np.add.reduceat(parts.rows, start), parts.rows[:, None]
+        mean = np.add.reduceat(each * parts.mean, start) / rows[:, None]
+        shift = parts.mean - mean[whole]
+        between = each[..., None] * _outer(shift, shift)
+        return RowSums(
+            rows,
+            mean,
+            np.add.reduceat(parts.products + between, start),
+            np.add.reduceat(parts.lagged + between, start),
+            np.minimum.reduceat(parts.low, start),
+            np.maximum.reduceat(parts.high, start),
+        )
+
+    def stretched(self, factor: np.ndarray) -> Self:
+        """Return sums as if x were longer by a factor of each set, shape (p,)."""
+        one = np.ones(len(factor))
+        scale = np.stack([factor, one, factor * np.abs(factor), one], axis=1)
+        return replace(
+            self,
+            mean=scale * self.mean,
+            products=_outer(scale, scale) * self.products,
+            lagged=_outer(scale, scale) * self.lagged,
+            low=factor * self.low,
+            high=factor * self.high,
+        )
+
+
+@dataclass(frozen=True)
+class MountingSums(RowSums):
+    """Sums of every mounting, with the index of its gear, ascending, and of its run."""
+
+    gear: np.ndarray
+    run: np.ndarray
+
+
+def _outer(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return one[:, :, None] * other[:, None, :]
+
+
+def reading_vectors(x: np.ndarray, sense: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return v of each row, shape (4, n)."""
+    return np.stack([x, sense, x * np.abs(x), force])
 
 
 @dataclass(frozen=True)
@@ -25,9 +131,9 @@ class FleetReadings:
         sums: of each mounting; the mean has the opposite sign where gears were pulled.
         side: −1 where they were pulled, else 1.
         size_ratio: stiffness of the sizes of each gear over that of the sizes in the
-            gear file, by which x was multiplied, shape (g,); None without such sizes.
-        sizes: sizes of each gear by column, if it has its own gear file.
-        faults: gears with a fault, each with what it is; some are among the readings.
+            gear file, by which x was multiplied, shape (g,).
+        sizes: of each gear by column, if it has its own gear file.
+        faults: by gear; some of these are among the readings.
     """
 
     case: Case
@@ -53,10 +159,7 @@ class FleetReadings:
         return stated or least_step(np.asarray(self.case.records.force))
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
-        """Return sums in which every gear has the sizes of the gear file.
-
-        The ratio is that of the stiffness of its sizes to that of these, shape (g,).
-        """
+        """Return sums in which every gear has the sizes of the gear file."""
         sums = self.sums.stretched(ratio[self.sums.gear])
         return replace(self, sums=sums, size_ratio=ratio)
 
@@ -77,9 +180,13 @@ class FleetReadings:
             specimen=np.searchsorted(gears, records.specimen),
             run=np.searchsorted(runs, records.run),
         )
-        of_gears = {n: _some(getattr(case, n), gears) for n in _OF_GEARS}
-        of_runs = {n: _some(getattr(case, n), runs) for n in _OF_RUNS}
-        case = replace(case, records=records, left_out=left_out, **of_gears, **of_runs)
+        labels = {
+            name: tuple(getattr(case, name)[place] for place in places)
+            for names, places in ((_OF_GEARS, gears), (_OF_RUNS, runs))
+            for name in names
+            if getattr(case, name)
+        }
+        case = replace(case, records=records, left_out=left_out, **labels)
         ratio = None if self.size_ratio is None else self.size_ratio[gears]
         sums = replace(sums, gear=gear, run=run)
         return replace(self, case=case, sums=sums, size_ratio=ratio)
@@ -87,10 +194,6 @@ class FleetReadings:
 
 _OF_GEARS = "specimen_labels", "lots"
 _OF_RUNS = "run_labels", "operators", "rigs", "dates"
-
-
-def _some(labels: tuple[str, ...], places: np.ndarray) -> tuple[str, ...]:
-    return tuple(labels[place] for place in places) if labels else ()
 
 
 def fleet_readings(case: Case) -> FleetReadings:
@@ -107,10 +210,7 @@ def fleet_readings(case: Case) -> FleetReadings:
 def readings_of(
     case: Case, gear: np.ndarray, run: np.ndarray, sums: RowSums
 ) -> FleetReadings:
-    """Return the readings of a case from the sums of its mountings.
-
-    The indices of gear and run are those of each mounting; gears ascend, shape (m,).
-    """
+    """Return readings; gears, which ascend, and runs are those of mountings, (m,)."""
     side = loading_side(np.array([sums.low.min(), sums.high.max()])) or 1
     # All components of v are odd in the deformation.
     each = {**vars(sums), "mean": side * sums.mean}

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm, t
 
+from hdcal.data.measurements.bad_gears import among
 from hdcal.errors import Finding
 from hdcal.fleets.model.groups import robust_sd
 from hdcal.fleets.model.line_fits import fit_terms
-from hdcal.fleets.reading.mounting_sums import MountingSums, RowSums
-from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.fleets.reading.readings import FleetReadings, MountingSums, RowSums
 from hdcal.screening.result import MACHINE_CLASS
 from hdcal.screening.wild import FEWEST
 
@@ -46,7 +46,7 @@ _Fault = tuple[Any, str]
 
 
 class CurveFits(NamedTuple):
-    """Line, loop and bend of p sets of rows by least squares, each with its own zero.
+    """Line, loop, bend and zero of p sets of rows by least squares.
 
     The residual as a combination of v, (p, 4), the degrees of freedom that are left,
     the sd of the residuals [N] and the correlation of neighbouring ones.
@@ -75,14 +75,9 @@ def irregular(
 ) -> np.ndarray:
     """Return sets of rows whose residuals are not independent and normal, shape (p,).
 
-    Tests of their largest one and of the correlation of neighbours; screening looks at
-    records of fewer than `FEWEST` rows for their sign only.
-
-    Args:
-        sums: of each set.
-        v: of every row, shape (4, n); `index` is its set.
-        index: of the set of each row, shape (n,).
-        relative: whether the correlation is compared with that of the usual set.
+    Tests of their largest one and of the correlation of neighbours, relative to that of
+    the usual set or not. Of fewer than `FEWEST` rows screening checks the sign only.
+    Rows have v, (4, n), and the index of their set, (n,).
     """
     fits = curve_fits(sums)
     usual = np.median(fits.alike) if relative else 0.0
@@ -100,19 +95,17 @@ def irregular(
 
 
 def faults_among_gears(readings: FleetReadings) -> dict[str, Finding]:
-    """Return gears whose record differs from those of all others, each with its fault.
-
-    The readings are those at one size.
-    """
+    """Return gears whose record at one size differs from the others, with its fault."""
     case, sums = readings.case, readings.sums
-    bad: dict[int, Finding] = {}
+    bad: dict[str, Finding] = {}
     # Each test is of the gears that passed the one before.
     for test in (_no_slope, _no_curve, _two_parts):
         if len(sums.gear):
             for gear, problem in test(readings, sums):
-                bad.setdefault(int(gear), Finding(case.name, problem, _REMEDY))
-            sums = sums.where(~np.isin(sums.gear, [*bad]))
-    return {case.specimen_labels[gear]: why for gear, why in bad.items()}
+                label = case.specimen_labels[gear]
+                bad.setdefault(label, Finding(case.name, problem, _REMEDY))
+            sums = sums.where(~among(case.specimen_labels, bad)[sums.gear])
+    return bad
 
 
 def _no_slope(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
@@ -121,9 +114,11 @@ def _no_slope(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
     place = np.bincount(sums.gear, sums.rows * sums.mean[:, 0] ** 2)
     square, pull = (np.bincount(sums.gear, sums.products[:, 0, k]) for k in (0, 3))
     still = (square <= _ROUNDING * place) & (rows > 0)
+    words = (
+        f"it was read at one {units.displacement} only in each of its runs: read it "
+    )
     for gear in np.flatnonzero(still):
-        words = f"it was read at one {units.displacement} only in each of its runs"
-        yield gear, f"{words}: read it at two or more in one run"
+        yield gear, f"{words}at two or more in one run"
     gears = np.flatnonzero(~still & (rows > 0))
     slope = pull[gears] / square[gears]
     flat = slope <= _FLAT * np.max(np.abs(slope), initial=0.0)
@@ -195,10 +190,7 @@ def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
 
 
 def _log_stiffness(sums: MountingSums) -> pd.DataFrame:
-    """Return the logarithm of the stiffness of mountings, and its variance.
-
-    Loop and bend of the usual mounting are taken out.
-    """
+    """Return log stiffness and its variance of mountings, less usual loop and bend."""
     fits, square = curve_fits(sums), sums.products[:, 0, 0]
     loop, bend = np.median(fits.residual[:, 1:3], axis=0)
     pull = sums.products[:, 0] @ np.array([0.0, loop, bend, 1.0])

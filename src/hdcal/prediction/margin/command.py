@@ -71,8 +71,8 @@ from hdcal.errors import Finding
 def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force at a deformation, from RUN.
 
-    RUN is a result folder of `hdcal calibrate`, `diagnose` or `fleet`. Hypotheses of a
-    diagnosis are averaged by their probability; from a fleet, future gears are bounded.
+    RUN is a result folder of `hdcal calibrate` or `diagnose`. Hypotheses of a diagnosis
+    are averaged by their probability.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.prediction.margin.margin import margin as bounds_of
