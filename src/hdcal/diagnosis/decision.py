@@ -36,14 +36,10 @@ _CREDIBLE, _DRAWS = 0.9, 300
 class Decision:
     """What a case shows about what its base model lacks.
 
-    Attributes:
-        gap: probability that something acts.
-        gap_N: rms of what acts on the mean reading, where it does [N]; None where no
-            draws were made.
-        explanations: all that are possible, the most probable first.
-        hypotheses: probability of each hypothesis on the mean reading and effect on
-            the noise.
-        coarse_step: step of forces that are read coarsely [N]; 0 where they are not.
+    `gap` is the probability that something acts, `gap_N` the rms of what acts on the
+    mean reading where it does, None where no draws were made. `hypotheses` are
+    components on the mean reading with an effect on the noise; `explanations` are all,
+    likeliest first.
     """
 
     gap: float
@@ -54,21 +50,13 @@ class Decision:
     coarse_step: float
 
 
-def decide(
-    case: Case,
-    library: Mapping[str, type[Effect]],
-    *,
-    temperature: float = TEMPERATURE,
-    seed: int = 0,
-) -> Decision:
+def decide(case: Case, library: Mapping[str, type[Effect]]) -> Decision:
     """Decide what acts in a case, of effects by name.
-
-    Log evidences are divided by the temperature.
 
     Raises:
         InputError: an effect has no prior.
     """
-    return decide_searched(search(case, library), temperature=temperature, seed=seed)
+    return decide_searched(search(case, library))
 
 
 def decide_searched(

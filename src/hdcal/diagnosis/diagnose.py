@@ -155,9 +155,7 @@ def _how_far(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> HowFar:
-    closed, word = None, ""
-    if names:
-        closed, word = closed_on_left_out(searched, fit, names, rng)
+    closed = closed_on_left_out(searched, fit, names, rng) if names else None
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():
         if name != OUTSIDE or len(fit.rms) > 1:
@@ -167,7 +165,7 @@ def _how_far(
     wild = fit.noise.name == OUTLIERS
     noise = "noise without wild readings" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
-    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
+    return HowFar(ladder=tuple(ladder), closed=closed)
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

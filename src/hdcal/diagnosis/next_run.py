@@ -37,14 +37,7 @@ _MOST, _LEAST_SHARE, _LEAST_NATS = 6, 0.01, 0.02
 
 
 class NextRun(Item):
-    """One run that a rig can do, and its information.
-
-    Attributes:
-        run: what to do, in words.
-        separates: the two hypotheses that it would separate best.
-        information_nats: expected information about which effect it is.
-        cost: in words, such as "one ramp".
-    """
+    """One run that a rig can do, and the two hypotheses that it separates best."""
 
     run: Words
     separates: tuple[tuple[EffectName, ...], tuple[EffectName, ...]]
@@ -176,7 +169,7 @@ def rank_runs(
             one, two = sorted(np.unravel_index(farthest, apart.shape))
             found = NextRun(
                 run=run.words,
-                separates=_differing(names[one], names[two]),
+                separates=(names[one], names[two]),
                 information_nats=nats,
                 cost=run.cost,
             )
@@ -201,12 +194,6 @@ def _likeliest(
         best.remove(())
     total = sum(share[names] for names in best)
     return {names: share[names] / total for names in best}
-
-
-def _differing(one: Names, two: Names) -> tuple[Names, Names]:
-    """Return hypotheses without their common effects, unless one contains the other."""
-    left, right = ({*one} - {*two}), ({*two} - {*one})
-    return (tuple(sorted(left)), tuple(sorted(right))) if left and right else (one, two)
 
 
 def _predicted(

@@ -52,12 +52,9 @@ _UP, _RISES = ("up", "down"), ("rises", "falls")
 class Seen(Item):
     """A pattern of the readings, whatever its cause.
 
-    Attributes:
-        statement: in words.
-        covariate: on which it depends.
-        size_N: from its lowest to its highest place, simultaneous 95 % interval.
-        p_value: adjusted for all patterns that were tested.
-        material: it is more than 0.025 % of the largest force.
+    The size is that from its lowest to its highest place, a simultaneous interval; the
+    p-value is adjusted for all patterns tested. It is material from 0.025 % of the
+    largest force on.
     """
 
     statement: Words
@@ -69,15 +66,11 @@ class Seen(Item):
 
 @dataclass(frozen=True)
 class Contrast:
-    """One pattern that readings may have.
+    """One pattern that readings may have, and a statement with {way} and {size}.
 
-    Attributes:
-        covariate: on which it depends.
-        column: its shape, shape (n,).
-        ways: the words for {way} where the coefficient is positive, and negative.
-        words: a statement with {way} and {size}.
-        off_line: whether its size is the swing off a straight line over x.
-        share: of the swing that is its size.
+    `ways` are the words for a positive and a negative coefficient. The size is a
+    `share` of the swing of the column, off a straight line over the stroke if
+    `off_line`.
     """
 
     covariate: str
@@ -221,10 +214,9 @@ def find_patterns(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
         same = contrast.words if contrast.covariate == "direction" else each.name
         once.setdefault(same, each)
     quantile = float(-ndtri((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
-    clearest = sorted(once.values(), key=lambda each: each.p_value)
     return tuple(
         _seen(tried[each.name], each, swing[each.name], quantile, case)
-        for each in clearest
+        for each in sorted(once.values(), key=lambda each: each.p_value)
     )
 
 

@@ -31,14 +31,10 @@ _MOST_ROWS = 5_000
 
 @dataclass(frozen=True)
 class Refits:
-    """Calibrated hypotheses.
+    """Calibrated hypotheses that may be used, with probabilities that sum to 1.
 
-    Attributes:
-        posteriors: probability and posterior by hypothesis, of those that may be used;
-            `none` for the plain model, `unknown` for that with a leftover gap. The
-            probabilities sum to 1.
-        left_out: probability without a model among these; None without any model.
-        failures: calibrations that failed their checks, and why.
+    `none` is the plain model, `unknown` that with a leftover gap. `left_out` is the
+    probability without a model among these; `failures` say why others cannot be used.
     """
 
     posteriors: Mapping[str, tuple[float, Posterior]]

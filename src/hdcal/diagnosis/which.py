@@ -65,11 +65,11 @@ def share_words(share: Interval) -> str:
 class Cause(Item):
     """Effects that this loading cannot separate, the likeliest first.
 
-    Attributes:
-        members: their names; none of something outside the library.
-        probability: that one of them acts, alone, in a pair, or with a remainder.
-        explains: share of the gap's rms that they close where they act; None of effects
-            on the noise.
+    None are something outside the library.
+
+    The probability is that one of them acts, alone, in a pair, or with a remainder.
+    They explain a share of the gap's rms where they act; effects on the noise explain
+    None.
     """
 
     members: tuple[EffectName, ...]
@@ -102,12 +102,9 @@ class Cause(Item):
 
 
 class Explanation(Item):
-    """Effects that together explain the readings.
+    """Effects that together explain the readings; none where nothing acts.
 
-    Attributes:
-        effects: none where nothing acts.
-        outside: whether they leave most of the gap to something outside the library.
-        probability: of this explanation.
+    `outside`: they leave most of the gap to something outside the library.
     """
 
     effects: tuple[EffectName, ...]
@@ -130,14 +127,9 @@ class Explanation(Item):
 class Which(Item):
     """Which effects cause the gap.
 
-    Attributes:
-        verdict: in a word.
-        causes: classes of effects, the most probable first.
-        explanations: the smallest set of them with 90 %.
-        inclusion: probability that each effect acts.
-        fits: whether the likeliest explanation fits.
-        p_value: of the check of its residuals.
-        not_testable: effects that predict nothing here, with what was not measured.
+    `causes` are classes of effects, `explanations` the smallest set with 90 %; `fits`
+    and `p_value` check the residuals of the likeliest. Effects that are not testable
+    predict nothing here, for what was not measured.
     """
 
     verdict: VerdictWord

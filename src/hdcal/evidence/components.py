@@ -68,11 +68,8 @@ def lacking(
 class Components:
     """Effects of a library on the mean reading.
 
-    Attributes:
-        names: of the effects.
-        grids: parameter values of each effect; None of members that differ.
-        atoms: of the effects with one amplitude.
-        spaces: of the others.
+    `grids` are None for effects whose members differ; effects with one amplitude have
+    atoms, the others spaces.
     """
 
     names: tuple[str, ...]
@@ -233,12 +230,8 @@ def effect_curves(
 ) -> np.ndarray:
     """Return the effect's contribution to the mean reading [N], shape (g, n).
 
-    Args:
-        effect: the effect.
-        values: of every parameter, each of shape (g,).
-        base: the force model about which it acts.
-        padded: the rows, from `padded_records`; all of them are predicted.
-        reading: how the rig reads.
+    `values` are those of every parameter, each of shape (g,). The effect acts about the
+    force model `base`; `padded` are all rows, from `padded_records`.
     """
     block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
     table = {name: np.asarray(column, float) for name, column in values.items()}

@@ -30,11 +30,8 @@ _CHOSEN = 8
 class Selection:
     """Atoms and spaces that are compared given every context.
 
-    Attributes:
-        atoms: the most probable ones, with the weight of all.
-        tolerance: columns of their shapes' tolerance at a relative sd of 1, (m, l, n).
-        spaces: effects with several columns, and kernels; wide ones first.
-        names: of all components, the remainder last.
+    `atoms` are the most probable ones, with the weight of all; `tolerance` are columns
+    of their shapes' tolerance at a relative sd of 1. The remainder is the last name.
     """
 
     problem: LinearProblem
@@ -125,14 +122,9 @@ def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> Bloc
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Evidence of all items given one context.
+    """Log evidence of all items given one context, and of the context alone (`none`).
 
-    Attributes:
-        none: log evidence of the context alone.
-        atoms: those with an amplitude.
-        spaces: log evidence of the others at each scale, `extra` last.
-        space_owner: component of each space.
-        extra: spaces that belong to this context.
+    `extra` are the last of the spaces: those that belong to this context.
     """
 
     selection: Selection
@@ -232,8 +224,7 @@ def select(
 ) -> Selection:
     """Return the most probable atoms of each effect, with the weight of all of them.
 
-    Atoms are compared over all models of the noise. `names` are those of all
-    components, the remainder last.
+    Atoms are compared over all models of the noise.
     """
     atoms, spaces = effects.atoms, (*effects.spaces, *kernels)
     if not len(atoms.owner):

@@ -41,13 +41,10 @@ _LEAST_NOISE = 1e-6
 
 @dataclass(frozen=True)
 class LinearProblem:
-    """Rows of one case with the columns of its base model.
+    """Rows of one case, run after run, with the columns of its base model.
 
     Attributes:
-        records: rows, run after run.
-        reading: how the rig reads.
         base: parameters about which effects are evaluated.
-        priors: by site name.
         y: force less the prior mean of the base model [N].
         X: columns of the base model [N per prior sd].
         noise_sd: reference noise sd [N]; the prior sds of b are multiplied by the noise
@@ -55,8 +52,7 @@ class LinearProblem:
         before: index of the row before in the same run, −1 for a run's first.
         weight: one over the relative noise sd that the file states for each row.
         tolerance: smooth functions by which an effect's shape may deviate.
-        log_shift: prior mean of the log stiffness less that of `base`.
-        log_sd: prior sd of the log stiffness.
+        log_shift: prior mean of the log stiffness less that of `base`; `log_sd` its sd.
         offsets: number of columns of X that are offsets of runs; their priors are so
             wide that each uses up a row.
     """

@@ -27,13 +27,8 @@ _STEPS = 3
 class Products(NamedTuple):
     """Inner products of items in whitened rows, less what the base explains.
 
-    Attributes:
-        ee: of the error, the readings less o, with itself, shape (m,).
-        eu: of error and slope, shape (m,).
-        uu: of the slope with itself, shape (m,).
-        te: of each principal axis of L with the error, shape (m, j).
-        tu: of each axis with the slope, shape (m, j).
-        square: squared length of each axis, shape (m, j).
+    Of the error e, the readings less o, the slope u and each principal axis t of L.
+    `square` is the squared length of each axis.
     """
 
     ee: Float[np.ndarray, " m"]
@@ -45,12 +40,10 @@ class Products(NamedTuple):
 
 
 class Marginal(NamedTuple):
-    """Evaluated items, each of shape (m, t).
+    """Log evidence of items, and their amplitudes given the noise sd.
 
-    Attributes:
-        log_evidence: log marginal likelihood, with a prior weight where one is stated.
-        mean: of the amplitude given the noise sd, before its bounds.
-        sd: of the amplitude, likewise.
+    The amplitudes are before any bounds; the evidence has a prior weight where one is
+    stated.
     """
 
     log_evidence: Float[np.ndarray, "m t"]
@@ -71,9 +64,7 @@ class _Given(NamedTuple):
 class _Loose:
     """The loose columns of items, at prior variances of their coefficients.
 
-    Attributes:
-        products: of the items.
-        lam: prior variance times squared length of each axis, shape (m, t, j).
+    `lam` is the prior variance times the squared length of each axis, shape (m, t, j).
     """
 
     def __init__(self, products: Products, variance: Float[np.ndarray, "m t"]):

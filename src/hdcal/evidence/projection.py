@@ -17,17 +17,9 @@ from hdcal.inference.force_model.serial_correlation import log_volume
 class Block(NamedTuple):
     """Whitened items with the same number of loose columns.
 
-    Attributes:
-        owner: index of the component; −1 of the base alone, shape (m,).
-        amplitude: priors of the amplitudes.
-        variance: prior variances of the loose coefficients, shape (m, t).
-        log_weight: log prior probability at each of them, shape (m, t).
-        offset: shape (m, n).
-        slope: shape (m, n).
-        loose: shape (m, j, n).
-        gram: products of the loose columns with each other, shape (m, j, j).
-        with_offset: products of the loose columns with the offset, shape (m, j).
-        with_slope: products of the loose columns with the slope, shape (m, j).
+    The owner is the component, −1 of the base alone. Variances and weights are of the
+    loose coefficients. The last three are products of the loose columns with each
+    other, with the offset and with the slope.
     """
 
     owner: Int[np.ndarray, " m"]
@@ -55,9 +47,8 @@ class _Curves(NamedTuple):
 class Projection:
     """The base and a context under one model of the noise.
 
-    Attributes:
-        square: square of the whitened readings with the base projected out.
-        constant: part of every log evidence: priors and volume of the whitening.
+    `square` is that of the whitened readings with the base projected out, `constant`
+    the part of every log evidence that priors and the volume of the whitening make.
     """
 
     def __init__(self, problem: LinearProblem, noise: NoiseModel, context: Context):

@@ -117,10 +117,7 @@ def _tables(problem: LinearProblem) -> list[Float[np.ndarray, "k n"]]:
 
 
 def kernels(problem: LinearProblem, effects: Components, owner: int) -> list[Space]:
-    """Return the kernels that the base model leaves and no single effect spans.
-
-    `owner` is the index of the remainder among the components.
-    """
+    """Return the kernels that the base model leaves and no single effect spans."""
     visible = []
     for table in _tables(problem):
         left = problem.project(table)
@@ -170,8 +167,7 @@ def remainder_space(
 ) -> Space:
     """Return a space of the remainder, whose size is unknown.
 
-    The columns have an rms of one together, shape (j, n), and are chosen from so many
-    spaces.
+    The columns have an rms of one together, and are chosen from so many spaces.
     """
     sd = float(problem.priors["gap_sd"].numbers[-1])
     log_weight = np.full(len(STEPS), -np.log(len(STEPS)) - np.log(choices))

@@ -27,7 +27,6 @@ from hdcal.evidence.noise_models import (
 from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
 from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
-    average_rows,
     coarse_step,
     half_cycle_rows,
     thin_rows,
@@ -51,6 +50,8 @@ _MOST_KERNELS, _ONE_MORE = 4, 0.25
 _LEAST_SHARING = 15
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
+# Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
+_MOST_ROWS = 10_000
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
 # cycle.
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
@@ -66,7 +67,9 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case = average_rows(with_coarse_step(case))
+    case = with_coarse_step(case)
+    step = -(-len(case.records.force) // _MOST_ROWS)
+    case = thin_rows(case, step) if step > 1 else case
     problem = linear_problem(case, library, free_runs=free_runs)
     found = Searched(problem, library)
     if _oversampled(problem, found.table):
@@ -112,21 +115,12 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
     return {"noise_sd": noise_sd, "stiffness": stiffness}
 
 
-def _likeliest(found: Evaluated, component: int) -> list[Part]:
-    return [found.likeliest(component)]
-
-
 class Searched:
     """All hypotheses of a case; everything alone is entered at once.
 
-    Attributes:
-        problem: the linear problem.
-        table: evidence of each hypothesis.
-        effects: of the library that predict something for the rows, by name.
-        lacking: columns that each of the others needs and that were not measured.
-        components: of the effects.
-        kernels: of the remainder.
-        coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
+    `effects` of the library predict something for the rows; the others lack columns
+    that were not measured. `coarse_step` is that of readings on a coarse grid [N], else
+    0.
     """
 
     coarse_step = 0.0
@@ -183,9 +177,8 @@ class Searched:
             table.put((), column, found.none, list)
             for k, value in enumerate(found.totals()):
                 if np.isfinite(value):
-                    name = (table.names[k],)
-                    parts = partial(_likeliest, found, k)
-                    table.put(name, column, value, parts)
+                    part = partial(found.likeliest, k)
+                    table.put((table.names[k],), column, value, lambda p=part: [p()])
 
     def fitted_correlations(self) -> None:
         """Enter everything alone with the correlations that two hypotheses leave.

@@ -24,11 +24,8 @@ _SINGLE = 1.0 - (_NONE + _REMAINDER + _WITH_REMAINDER + _PAIRS + _PAIRS_WITH)
 class EvidenceTable:
     """Log evidence of hypotheses on the mean reading, by model of the noise.
 
-    Attributes:
-        names: of the components on the mean reading, the remainder last.
-        noises: models of the noise; the evidences contain their priors.
-        log_evidence: of each hypothesis, shape (noises,).
-        parts: the components of each at their most probable items.
+    The remainder is the last name. Evidences contain the priors of the noises; `parts`
+    are the components of each hypothesis at their most probable items.
     """
 
     names: tuple[str, ...]

@@ -143,14 +143,11 @@ def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
 
 
 class IntegratedMotion(NamedTuple):
-    """A motion over time.
+    """Deformation [mm] and speed [mm/s] at the times.
 
-    Attributes:
-        deformation: at the times [mm].
-        speed: at the times [mm/s].
-        largest: largest size of the deformation, also between the times [mm].
-        done: whether the integration came to its end within the number of steps.
-        gone: whether it ended at the reach.
+    `largest` is the largest size of the deformation, also between the times [mm].
+    `done`: the integration came to its end within the number of steps; `gone`: at the
+    reach.
     """
 
     deformation: Float[Array, " n"]

@@ -38,13 +38,7 @@ def _sine(x):
 
 
 class LinearGear(NamedTuple):
-    """The linear oscillator m ÿ + c ẏ + k y = F.
-
-    Attributes:
-        mass: m [N·s²/mm].
-        damping: c [N·s/mm].
-        stiffness: k, of all steps or of each [N/mm].
-    """
+    """m ÿ + c ẏ + k y = F; k of all steps or of each [N, mm, s]."""
 
     mass: Scalar
     damping: Scalar
