@@ -80,14 +80,9 @@ def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, "
 class Acting:
     """Draws of one hypothesis and noise model in which the same components act.
 
-    Attributes:
-        weight: their probability.
-        components: that act on the mean reading, sorted.
-        noise: effect on the noise, empty without one.
-        closed: share of the gap's rms that each class closes, and the remainder, by
-            name; empty where no draws were made.
-        carried: share that all effects of the library close together.
-        rms: of the gap [N].
+    On the noise none may act. `closed` are the shares of the rms of the gap [N] that
+    each class and the remainder close, by name, `carried` is that of all effects of the
+    library together; where no draws were made nothing is known of them.
     """
 
     weight: float

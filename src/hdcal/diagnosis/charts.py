@@ -14,7 +14,6 @@ from hdcal.quantities import Quantities
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
     BLUE,
-    GREY,
     ORANGE,
     Band,
     Bars,
@@ -105,31 +104,20 @@ def _gap(
 def which_chart(which: Which) -> Chart:
     """Return the probability of each class of effects, and of anything else."""
     shown = [c for c in which.causes if c.probability >= _LEAST][:_MOST]
-    causes = [c for c in shown if not c.on_noise]
-    noise = [c for c in shown if c.on_noise]
-    bars, at = list[Mark](), 1.0
-    groups = (causes, BLUE), ([which.outside], ORANGE), (noise, GREY)
-    for group, colour in groups:
-        if group:
-            chances = np.array([each.probability for each in group])
-            bars.append(
-                Bars(at=at + np.arange(len(group)), high=chances, colour=colour)
-            )
-            at += len(group)
-    names = [
-        either(cause.members) if cause.members else "outside the library"
-        for cause in (*causes, which.outside, *noise)
-    ]
-    return _ranked("probability that it acts", bars, names)
+    named = {either(cause.members): cause.probability for cause in shown}
+    named["outside the library"] = which.outside.probability
+    return _ranked("probability that it acts", named)
 
 
-def _ranked(axis: str, bars: list[Mark], names: list[str]) -> Chart:
+def _ranked(axis: str, named: dict[str, float]) -> Chart:
     """Return bars with room for long names."""
+    names, high = [*named], np.array([*named.values()])
+    bars = Bars(at=np.arange(1.0, len(names) + 1.0), high=high, colour=BLUE)
     lines = max((len(wrap(name, 40)) for name in names), default=1)
     panel = Panel(
         x="",
         y=axis,
-        marks=bars,
+        marks=[bars],
         names=names,
         horizontal=True,
         y_limits=(0.0, None),
@@ -141,8 +129,5 @@ def _ranked(axis: str, bars: list[Mark], names: list[str]) -> Chart:
 
 def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
     """Return what each model leaves, from the straight model to the noise."""
-    rungs = [rung for rung in far.ladder if rung.model != FORMULA]
-    rms = np.array([rung.rms_N for rung in rungs])
-    bars = Bars(at=np.arange(1.0, len(rms) + 1.0), high=rms, colour=BLUE)
-    axis = load_axis(units, "root mean square of what is left")
-    return _ranked(axis, [bars], [rung.model for rung in rungs])
+    rungs = {rung.model: rung.rms_N for rung in far.ladder if rung.model != FORMULA}
+    return _ranked(load_axis(units, "root mean square of what is left"), rungs)

@@ -12,7 +12,7 @@ from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.charts import FORMULA
-from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide_searched
+from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide
 from hdcal.diagnosis.gap import Fitted, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
@@ -63,7 +63,7 @@ def diagnose(
     _check(case, effects, seed)
     rng = np.random.default_rng(seed)
     searched = search(case, effects)
-    found = decide_searched(searched, seed=seed)
+    found = decide(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)

@@ -71,11 +71,7 @@ def gap_by_row(
 def fitted(
     searched: Searched, posterior_of: Mapping[Names, np.ndarray], names: Sequence[str]
 ) -> Fitted:
-    """Return the likeliest of the hypotheses that contain most of some effects.
-
-    `names` are those of the effects on the mean reading; a hypothesis contains two at
-    most.
-    """
+    """Return the likeliest of the hypotheses that contain most of the named effects."""
     problem, table = searched.problem, searched.table
     key = max(
         posterior_of,
@@ -149,8 +145,8 @@ def _errors(
 ) -> Float[np.ndarray, " 3"]:
     """Return mean squared errors on some rows of models that were fitted without them.
 
-    In noise variances of a row: the base model's, less the noise and less the variance
-    of the prediction; the same with the effects; and the variance of that prediction.
+    In noise variances: the base model's, less the noise and less the variance of the
+    prediction; the same with the effects; and the variance of that prediction.
     """
     noise, rest = fit.noise, problem.without(left_out)
     others = noise._replace(weight=np.where(left_out, 0.0, noise.weight))

@@ -49,10 +49,7 @@ class Diagnoses(Result):
 
 
 def read_cases(paths: Sequence[str], **reading) -> tuple[list[Case], Refused]:
-    """Read every case; one that cannot be used does not stop the others.
-
-    Returns:
-        The cases, with different names; and what is wrong with the others, by path.
+    """Return cases of different names, and what is wrong with the others, by path.
 
     Raises:
         InputError: holds everything that is wrong where no case can be used.
@@ -86,9 +83,7 @@ def all_findings(refused: Refused) -> list[Finding]:
 def diagnose_many(
     cases: Sequence[Case], refused: Refused, folder: Path, *, jobs: int, **how
 ) -> Diagnoses:
-    """Diagnose every case in processes and write its result into a folder of its name.
-
-    Cases have different names; `refused` is what is wrong with the others.
+    """Diagnose cases of different names, each into a folder of its name.
 
     Raises:
         InputError: holds everything that is wrong where no case can be used.
@@ -129,10 +124,7 @@ def diagnose_into(
     seed: int,
     progress: "Progress | None" = None,
 ) -> "Diagnosis":
-    """Diagnose a case, and write the result once all files are made.
-
-    The library is given as in `choose_library`; a page with figures is the report.
-    """
+    """Diagnose a case, and write the result once all files are made."""
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library
     from hdcal.report.result_folder import page_files
@@ -153,11 +145,7 @@ def diagnose_into(
 
 
 def _wrong(name: str, error: Exception, *, alone: bool = False) -> tuple[Finding, ...]:
-    """Return what is wrong with a case: bad input, or a defect of hdcal.
-
-    Raises:
-        Exception: the error, unless other cases can continue without it.
-    """
+    """Return what is wrong with a case; raise what stops the other ones too."""
     if isinstance(error, InputError):
         return tuple(error.findings)
     debug = os.environ.get("HDCAL_DEBUG") == "1"

@@ -9,16 +9,11 @@ from hdcal.evidence.noise_models import GROWING, OUTLIERS
 from hdcal.report.item import EffectName, Interval, Item, Probability, Words
 from hdcal.report.words import label
 
-# From these probabilities on an effect is reported as acting, and as named.
-LIKELY, NAMED = 0.5, 0.9
+# From this probability on an effect is reported as acting.
+LIKELY = 0.5
 # A gap matters from this rms on, as a share of the largest force: the error of
 # interpolation that ISO 376 allows its best class of force gauges, 00.
 MATTERS = 2.5e-4
-# Least p-value of an explanation that fits.
-ADEQUATE = 0.01
-# From this share on an effect explains all of the gap, and below the other nothing
-# that counts.
-ALL, _LITTLE = 0.99, 0.01
 # Names of a class in a sentence: where there are more, two and the number of others.
 _MOST = 3
 _WORDS = {
@@ -53,23 +48,17 @@ def either(members: Sequence[str]) -> str:
 
 def share_words(share: Interval) -> str:
     """Return a share of the gap with its interval."""
-    ends = [round(100.0 * end) for end in (share.lo, share.hi)]
-    if share.median >= ALL:
-        least = f" (at least {ends[0]} %)" if ends[0] < 100 else ""
-        return f"all of the gap{least}"
-    if share.hi < 1.5 * _LITTLE:
-        return "less than 2 % of the gap"
-    return f"{round(100.0 * share.median)} % ({ends[0]} … {ends[1]} %) of the gap"
+    median, low, high = (
+        f"{end:.0%}"[:-1] for end in (share.median, share.lo, share.hi)
+    )
+    return f"{median} % ({low} … {high} %) of the gap"
 
 
 class Cause(Item):
     """Effects that this loading cannot separate, the likeliest first.
 
-    None are something outside the library.
-
-    The probability is that one of them acts, alone, in a pair, or with a remainder.
-    They explain a share of the gap's rms where they act; effects on the noise explain
-    None.
+    None are something outside the library. The probability is that one of them acts;
+    they then explain a share of the gap's rms, effects on the noise None.
     """
 
     members: tuple[EffectName, ...]

@@ -52,10 +52,7 @@ _BLOCK, _MOST_VALUES = 64, 2**22
 def lacking(
     library: Mapping[str, type[Effect]], records: Records
 ) -> dict[str, tuple[str, ...]]:
-    """Return the columns that effects need and that were not measured.
-
-    An effect with any of them predicts nothing for the rows.
-    """
+    """Return the columns that effects need and that were not measured."""
     known, found = records.known, {}
     for name, effect in library.items():
         columns = {_COLUMNS[n] for n in effect.needs - known if n in _COLUMNS} - known
@@ -66,11 +63,7 @@ def lacking(
 
 @dataclass(frozen=True)
 class Components:
-    """Effects of a library on the mean reading.
-
-    `grids` are None for effects whose members differ; effects with one amplitude have
-    atoms, the others spaces.
-    """
+    """Effects of a library on the mean reading; scatter of members has no grid."""
 
     names: tuple[str, ...]
     grids: tuple[ParameterGrid | None, ...]
@@ -230,8 +223,7 @@ def effect_curves(
 ) -> np.ndarray:
     """Return the effect's contribution to the mean reading [N], shape (g, n).
 
-    `values` are those of every parameter, each of shape (g,). The effect acts about the
-    force model `base`; `padded` are all rows, from `padded_records`.
+    `values` are those of every parameter, each of shape (g,); `padded` are all rows.
     """
     block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
     table = {name: np.asarray(column, float) for name, column in values.items()}

@@ -83,18 +83,11 @@ class _Loose:
         return _Given(log_det, all_ee - ee, all_eu - eu, all_uu - uu, used)
 
 
-class _Amplitude(NamedTuple):
-    """The normal factor of an amplitude in the likelihood times its prior."""
-
-    precision: np.ndarray
-    score: np.ndarray
-    mean: np.ndarray
-
-
-def _amplitude(given: _Given, variance, prior: Amplitudes) -> _Amplitude:
+def _amplitude(given: _Given, variance, prior: Amplitudes):
+    """Return precision, score and mean of an amplitude: likelihood times prior."""
     precision = given.uu / variance + prior.precision + _TINY
     score = given.eu / variance + prior.precision * prior.mean
-    return _Amplitude(precision, score, score / precision)
+    return precision, score, score / precision
 
 
 def log_marginal(
@@ -126,8 +119,8 @@ def log_marginal(
     value += np.log(_WEIGHTS)[:, None, None] + nodes**2
     log_evidence = np.logaddexp.reduce(value, axis=0)
     log_evidence += 0.5 * np.log(2.0 * width**2) - 0.5 * count * _LOG_2PI
-    found = _amplitude(loose.given(noise), noise, prior)
-    return Marginal(log_evidence, found.mean, found.precision**-0.5)
+    precision, _, mean = _amplitude(loose.given(noise), noise, prior)
+    return Marginal(log_evidence, mean, precision**-0.5)
 
 
 def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes):
@@ -136,8 +129,7 @@ def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes):
     variance = np.broadcast_to(square / count, loose.lam.shape[:-1])
     for _ in range(_STEPS):
         given = loose.given(variance)
-        size = _amplitude(given, variance, prior).mean
-        size = np.clip(size, prior.low, prior.high)
+        size = np.clip(_amplitude(given, variance, prior)[2], prior.low, prior.high)
         left = given.ee - 2.0 * size * given.eu + size**2 * given.uu
         free = np.maximum(count - given.used, 1.0)
         variance = np.maximum(left, 1e-9 * square) / free

@@ -115,11 +115,10 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    There is none where wild rows agree with their neighbours: that is structure. The
-    probabilities that rows are wild come from an EM fit. With any such probabilities
-    the evidence of every hypothesis is a lower bound, which is tight where rows are
-    clearly wild or clearly not. `fitted` maps weights of rows to the mean reading given
-    some hypothesis. No correlation is tried as well.
+    There is none where wild rows agree with their neighbours: that is structure. With
+    any probabilities that rows are wild the evidence of every hypothesis is a lower
+    bound, tight where rows are clearly wild or not; these come from an EM fit. `fitted`
+    maps weights of rows to the mean reading given some hypothesis.
     """
     quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
     ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
@@ -157,10 +156,7 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
 
 
 def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
-    """Whether wild rows err too often to the same side as wild rows before them.
-
-    The errors of rows that are not wild are 0.
-    """
+    """Whether wild rows err too often to the same side as wild rows before them."""
     pairs = wild * np.where(before >= 0, wild[before], 0.0)
     same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))
     found = all_pairs and binomtest(same, all_pairs, 0.5, "greater").pvalue < _CHANCE

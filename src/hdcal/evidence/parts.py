@@ -39,12 +39,12 @@ class Part(NamedTuple):
     mean: Float[np.ndarray, " j"]
     sd: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
-    one_sided: bool
     shape: int
-    chord: tuple[float, float]
     place: tuple[int, int] | None
     spread: float
     levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
+    one_sided: bool = False
+    chord: tuple[float, float] = (0.0, 1.0)
 
     @property
     def width(self) -> int:
@@ -83,12 +83,9 @@ class DrawnCurves(NamedTuple):
 
 def join(problem: LinearProblem, parts: Sequence[Part]) -> Context:
     """Return several parts as one context."""
-    contexts = [part.context() for part in parts]
-    none = np.zeros((0, len(problem.y)))
-    return Context(
-        np.sum([none.sum(axis=0), *(each.offset for each in contexts)], axis=0),
-        np.concatenate([none, *(each.columns for each in contexts)]),
-    )
+    none = Context(np.zeros(len(problem.y)), np.zeros((0, len(problem.y))))
+    offsets, columns = zip(none, *(part.context() for part in parts), strict=True)
+    return Context(np.sum(offsets, axis=0), np.concatenate(columns))
 
 
 class LinearPosterior(NamedTuple):
@@ -195,10 +192,7 @@ def _drawn(
 def mean_curves(
     problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
 ) -> Float[np.ndarray, "k n"]:
-    """Return what the base model leaves of each part at its posterior mean.
-
-    Rows are weighted by their stated noise.
-    """
+    """Return what the base leaves of each part's mean, rows by stated noise."""
     found = posterior(problem, noise, parts)
     curves = [
         part.context().offset + found.columns[:, place] @ found.mean[place]

@@ -11,19 +11,12 @@ from functools import partial
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.evidence import noise_models
 from hdcal.evidence.components import components, lacking
 from hdcal.evidence.evaluation import Evaluated, select
 from hdcal.evidence.items import Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
-from hdcal.evidence.noise_models import (
-    GROWING,
-    OUTLIERS,
-    NoiseModel,
-    correlated_noise,
-    equal_noise,
-    growing_noise,
-    outliers,
-)
+from hdcal.evidence.noise_models import GROWING, OUTLIERS, NoiseModel
 from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
 from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
@@ -139,7 +132,9 @@ class Searched:
         self.kernels = known_kernels or kernels(problem, effects, self.outside)
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
-        self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
+        self.table = EvidenceTable(
+            (*effects.names, OUTSIDE), noise_models.equal_noise(problem)
+        )
         spaces, names = self._sharing(self.kernels), self.table.names
         self.selection = select(problem, self.table.noises, effects, spaces, names)
         self.found_alone: dict[int, Evaluated] = {}
@@ -189,7 +184,9 @@ class Searched:
         largest = table.noises[-1].correlation
         for key in dict.fromkeys([(), table.ranked()[0]]):
             fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            more = correlated_noise(problem, problem.y - fit.reading, largest)
+            more = noise_models.correlated_noise(
+                problem, problem.y - fit.reading, largest
+            )
             known = np.array([noise.correlation for noise in table.noises])
             if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
                 table.add_noises([more])
@@ -200,7 +197,11 @@ class Searched:
         table, problem = self.table, self.problem
         likeliest = int(np.argmax(table.noise_probabilities()))
         correlation = table.noises[likeliest].correlation
-        more = growing_noise(problem, correlation) if GROWING in library else []
+        more = (
+            noise_models.growing_noise(problem, correlation)
+            if GROWING in library
+            else []
+        )
         if OUTLIERS in library:
             for key in dict.fromkeys([(), table.ranked()[0]]):
                 parts = table.parts[key]
@@ -209,7 +210,7 @@ class Searched:
                     equal = NoiseModel("", weight, 0.0, 0.0)
                     return posterior(problem, equal, parts).reading
 
-                more += outliers(problem, correlation, fitted)
+                more += noise_models.outliers(problem, correlation, fitted)
         count = len(table.noises)
         table.add_noises(more)
         self._alone(range(count, len(table.noises)))
@@ -262,10 +263,7 @@ class Searched:
     def _extend(
         self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
     ) -> None:
-        """Enter everything, or some components, given some parts.
-
-        These are one component, or a pair whose evidence is in the table.
-        """
+        """Enter everything, or some components, given one or an entered pair."""
         table = self.table
         key = tuple(sorted(table.names[part.component] for part in parts))
         for column, found in self._evaluate(columns, parts, only).items():

@@ -74,10 +74,7 @@ class EvidenceTable:
     def put(
         self, names: Names, column: int, value: float, parts: Callable[[], list[Part]]
     ) -> None:
-        """Enter an evidence; of several lower bounds the largest counts.
-
-        `parts` returns the components, where this is the largest evidence so far.
-        """
+        """Enter an evidence, and its components if it is the largest bound so far."""
         key = tuple(sorted(names))
         none = np.full(len(self.noises), -np.inf)
         row = self.log_evidence.setdefault(key, none)

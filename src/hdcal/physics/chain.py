@@ -108,7 +108,7 @@ def force(
     deformation_offset: Value = 0.0,
     force_offset: Value = 0.0,
 ) -> Float[Array, "..."]:
-    """Compute F = K k(E₀ (1 − α ΔT)) (ω − ω₀) + b, differentiable in every argument.
+    """Compute F = K k(E₀ (1 − α ΔT)) (ω − ω₀) + b [N], broadcast and differentiable.
 
     Args:
         geometry: sizes [mm].
@@ -120,9 +120,6 @@ def force(
         temperature_rise: ΔT = T − T_ref [K].
         deformation_offset: ω₀ [mm].
         force_offset: b [N].
-
-    Returns:
-        Force [N] in double precision, broadcast over the arguments.
     """
     deformation = jnp.asarray(deformation, dtype=float)
     warm = modulus * (1.0 - alpha * temperature_rise)

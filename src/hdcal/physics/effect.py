@@ -66,20 +66,17 @@ class Effect(eqx.Module, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
     Its name, the key of the registry and prefix of the posterior sites, is that of the
-    class in snake case. The attributes are declared by keywords of the class. A
-    subclass without a stage inherits all of them, and the name, from its base.
+    class in snake case. A subclass without a stage inherits all keywords from its base.
 
     Attributes:
         stage: where in the measurement chain it acts.
         family: kind of mechanism, such as "loop" or "rig".
         needs: features of the records without which it cannot be tested.
-        instantaneous: whether it is a force or play of the gear itself that depends
-            on deformation, speed and temperature of the moment only; `hdcal respond`
-            includes such effects and leaves others out.
+        instantaneous: whether it is a force or play of the gear itself that depends on
+            the moment only; `hdcal respond` leaves other effects out.
         mixture: whether the noise of a reading becomes more than one normal.
-        period: name of the shape parameter that is a period in radial deformation
-            [mm], for an effect with several amplitudes. Records shorter than one
-            period cannot show the effect, unless its prior says so.
+        period: name of the shape parameter that is a period in radial deformation [mm],
+            for an effect with several amplitudes that shorter records cannot show.
     """
 
     name: ClassVar[str]
