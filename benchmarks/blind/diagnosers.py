@@ -8,6 +8,7 @@ from benchmarks.blind.label import NONE, OUTSIDE, Answer, Cause, Quantiles
 from benchmarks.blind.rivals import fit_each
 from hdcal.diagnosis import which
 from hdcal.diagnosis.decision import Decision, decide
+from hdcal.evidence.search import search
 from hdcal.physics.effect import Effect
 from hdcal.report.item import Interval
 
@@ -20,7 +21,7 @@ _LEAST = 0.01
 
 def by_hdcal(case: hdcal.Case, library: Library) -> Answer:
     """Answer as `hdcal diagnose` decides."""
-    return answer_of(case.name, decide(case, library), library)
+    return answer_of(case.name, decide(search(case, library)), library)
 
 
 def answer_of(case: str, found: Decision, library: Library) -> Answer:

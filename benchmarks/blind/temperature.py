@@ -20,7 +20,7 @@ from benchmarks.blind.opening import shown
 from benchmarks.blind.scored_case import STATED, ScoredCase
 from benchmarks.blind.scores import class_statements, log_score, right
 from benchmarks.blind.sealed_set import read_key, read_set, refusal
-from hdcal.diagnosis.decision import decide_searched
+from hdcal.diagnosis.decision import decide
 from hdcal.evidence.search import search
 
 TEMPERATURES = 1.15 ** np.arange(-2.0, 11.0)
@@ -30,7 +30,7 @@ def at_each(case: hdcal.Case, library: Library) -> list[Answer]:
     """Answer a case at each temperature."""
     searched = search(case, library)
     return [
-        answer_of(case.name, decide_searched(searched, temperature=value), library)
+        answer_of(case.name, decide(searched, temperature=value), library)
         for value in TEMPERATURES
     ]
 

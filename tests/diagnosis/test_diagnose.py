@@ -36,7 +36,7 @@ def plain() -> Searched:
 def closed(searched: Searched, name: str):
     fit = fitted(searched, searched.table.posterior(TEMPERATURE), [name])
     rng = np.random.default_rng(0)
-    return closed_on_left_out(searched, fit, [name], rng)[0]
+    return closed_on_left_out(searched, fit, [name], rng)
 
 
 def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):

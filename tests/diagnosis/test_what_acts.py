@@ -8,8 +8,10 @@ from diagnosis_cases import rich, simulated
 from rigs import make_records
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.decision import Decision, decide
+from hdcal.diagnosis import decision
+from hdcal.diagnosis.decision import Decision
 from hdcal.diagnosis.which import Cause
+from hdcal.evidence.search import search
 from hdcal.physics.registry import EFFECTS
 
 HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
@@ -18,6 +20,10 @@ PLANTED = {
     "amplifier_drift": {"rate": 0.02},
     "progressive_stiffening": {"slope": 0.4},
 }
+
+
+def decide(case: Case, library=EFFECTS) -> Decision:
+    return decision.decide(search(case, library))
 
 
 def class_of(found: Decision, name: str) -> Cause:
@@ -38,7 +44,7 @@ def with_wild_readings(case: Case, count: int = 9) -> Case:
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_effect_acts_and_probabilities_add_up(name: str):
-    found = decide(simulated(rich(), {name: PLANTED[name]}, seed=1), EFFECTS)
+    found = decide(simulated(rich(), {name: PLANTED[name]}, seed=1))
     assert found.which.effect == name
     cause = class_of(found, name)
     assert cause.probability >= 0.9 and cause in found.which.acting and found.which.fits
@@ -55,7 +61,7 @@ def test_a_planted_effect_acts_and_probabilities_add_up(name: str):
 
 @pytest.mark.parametrize("effects", [{}, HYSTERESIS])
 def test_wild_readings_are_outliers_with_or_without_structure(effects: dict):
-    found = decide(with_wild_readings(simulated(rich(), effects, seed=2)), EFFECTS)
+    found = decide(with_wild_readings(simulated(rich(), effects, seed=2)))
     assert found.which.inclusion["outliers"] > 0.9
     assert found.which.outside.probability < 0.1
     assert found.which.explanations[0].effects == (*effects, "outliers")
@@ -65,7 +71,7 @@ def test_readings_that_agree_with_their_neighbours_are_no_outliers():
     case = simulated(rich(), seed=5)
     force = np.array(case.records.force)
     force[70:100] += 3.0
-    found = decide(with_force(case, force), EFFECTS)
+    found = decide(with_force(case, force))
     assert found.which.inclusion["outliers"] < 0.1 and found.gap > 0.99
     assert found.which.outside.probability > 0.9
 
@@ -78,7 +84,7 @@ def test_loading_or_shape_separates_yield_from_saturation(softening, path, alike
     """A large kink is no smooth saturation, even where nothing was unloaded."""
     records = rich() if path == "cycles" else make_records(np.linspace(0.02, 0.54, 120))
     size = {"softening": softening, "yield_deformation": 0.35}
-    found = decide(simulated(records, {"plastic_yield": size}, seed=1), EFFECTS)
+    found = decide(simulated(records, {"plastic_yield": size}, seed=1))
     cause = class_of(found, "plastic_yield")
     assert cause.probability > 0.9
     assert ("force_saturation" in cause.members) == alike
@@ -98,14 +104,14 @@ def test_an_effect_beside_a_wave_has_its_share():
     case = simulated(rich(), HYSTERESIS, seed=1)
     place = np.asarray(case.records.deformation) / 0.54
     wave = 1.2 * np.sin(2.0 * np.pi * 4.0 * place**2.5)
-    found = decide(with_force(case, case.records.force + wave), EFFECTS)
+    found = decide(with_force(case, case.records.force + wave))
     cause = class_of(found, "hysteresis")
     assert cause.probability > 0.9 and found.which.outside.probability > 0.9
     assert cause.explains is not None and 0.3 < cause.explains.median < 0.9
 
 
 def test_effects_without_their_column_are_not_tested():
-    which = decide(simulated(make_records(np.linspace(0.02, 0.54, 60))), EFFECTS).which
+    which = decide(simulated(make_records(np.linspace(0.02, 0.54, 60)))).which
     assert which.not_testable["thermal_stiffness"] == ("temperature",)
     assert which.not_testable["ovality"] == ("angle",)
     assert not which.not_testable.keys() & which.inclusion.keys()

@@ -1,18 +1,12 @@
-"""The step of a coarse reading is found in the digits; long records are averaged."""
+"""The step of a coarse reading is found in the digits."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnosis_cases import NOISE, rich, simulated
-from rigs import cycles, make_case
 
-from hdcal.evidence.row_features import (
-    average_rows,
-    coarse_step,
-    half_cycles,
-    with_coarse_step,
-)
+from hdcal.evidence.row_features import coarse_step, with_coarse_step
 
 
 def read(step: float, digits: int, scale: float = 1.0):
@@ -35,18 +29,3 @@ def test_the_step_is_found(step: float, digits: int, scale: float):
 @pytest.mark.parametrize("digits", [1, 2, 3, 9])
 def test_digits_finer_than_the_noise_are_no_step(digits: int):
     assert coarse_step(with_coarse_step(read(0.0, digits)), NOISE) == 0.0
-
-
-def test_long_records_are_averaged_within_half_cycles():
-    records = cycles(600)
-    records = replace(records, force_sd=np.full(600, 0.3))
-    case = make_case(replace(records, force=195.0 * records.deformation))
-    short = average_rows(case, 210).records
-    # Groups of three; a half cycle ends with a smaller one.
-    halves = half_cycles(records)
-    assert len(short.force) == sum(-(-n // 3) for n in np.bincount(halves))
-    first = np.mean(np.asarray(case.records.force)[:3])
-    assert short.force[0] == pytest.approx(first)
-    assert short.force_sd[0] == pytest.approx(0.3 / np.sqrt(3.0))
-    assert short.force == pytest.approx(195.0 * np.asarray(short.deformation))
-    assert average_rows(case, 600) is case

@@ -8,8 +8,13 @@ import pytest
 from hdcal import EFFECTS
 from hdcal.data.records import Geometry
 from hdcal.physics.chain import Base, Reading
-from hdcal.physics.dynamics import Oscillator, integrate, natural_frequency, ring_mass
-from hdcal.physics.forcing import Chirp, SampledForce, Step
+from hdcal.physics.dynamics import (
+    Forcing,
+    Oscillator,
+    integrate,
+    natural_frequency,
+    ring_mass,
+)
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.physics.theory import ring
 
@@ -28,9 +33,18 @@ def gear(ratio: float, effects=(), reading=None) -> Oscillator:
     return Oscillator(MASS, damping, base, effects, reading, 20.0)
 
 
-def sine(frequency: float) -> Chirp:
-    """Return a sweep of no width."""
-    return Chirp(FORCE, frequency, frequency, 1.0)
+STEP = Forcing(np.zeros(1), np.full(1, FORCE))
+
+
+class Sine(Forcing):
+    frequency: float
+
+    def __call__(self, time):
+        return FORCE * jnp.sin(2.0 * jnp.pi * self.frequency * time)
+
+
+def sine(frequency: float) -> Sine:
+    return Sine(STEP.time, STEP.force, frequency)
 
 
 @jax.jit
@@ -78,7 +92,7 @@ def worst(found, expected) -> float:
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_a_step_is_answered_as_in_the_textbook(ratio):
     expected = step_response(ratio, TIMES)
-    assert worst(move(gear(ratio), Step(FORCE), TIMES)[:, 0], expected) < 1e-7
+    assert worst(move(gear(ratio), STEP, TIMES)[:, 0], expected) < 1e-7
     force, rest = np.full(len(TIMES), FORCE), np.zeros(2)
     linear = LinearGear(MASS, gear(ratio).damping, STIFFNESS)
     exact = exact_response(linear, TIMES, force, rest)[:, 0]
@@ -99,7 +113,7 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     force = rng.normal(0.0, 40.0, 80)
     linear = LinearGear(MASS, gear(ratio).damping, STIFFNESS)
     exact = exact_response(linear, time, force, np.zeros(2))
-    found = move(gear(ratio), SampledForce(time, force), time)
+    found = move(gear(ratio), Forcing(time, force), time)
     assert worst(found[:, 0], exact[:, 0]) < 1e-6
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
 
@@ -112,7 +126,7 @@ def test_dry_friction_takes_four_times_itself_of_each_swing(friction):
     """
     rubbed = gear(0.0, (EFFECTS["coulomb_friction"](force=friction),))
     halves = np.arange(5) * np.pi / PACE
-    found = move(rubbed, Step(FORCE), np.append(halves, 100.0 * halves[1]))[:, 0]
+    found = move(rubbed, STEP, np.append(halves, 100.0 * halves[1]))[:, 0]
     expected, sense = [0.0], 1.0
     for _ in halves[1:]:
         turn, middle = expected[-1], (FORCE - sense * friction) / STIFFNESS
@@ -143,7 +157,7 @@ def test_friction_sticks_and_slips_in_a_slow_motion(effect, held):
 
 def test_hardening_raises_the_frequency_and_keeps_the_energy():
     hard = EFFECTS["progressive_stiffening"](slope=0.8)
-    states = np.asarray(move(gear(0.0, (hard,)), Step(FORCE), TIMES))
+    states = np.asarray(move(gear(0.0, (hard,)), STEP, TIMES))
     y, speed = states.T
     # g = k y (1 + a y) for y > 0: work done is kinetic plus stored energy.
     stored = STIFFNESS * (y**2 / 2.0 + 0.8 * y**3 / 3.0)
@@ -169,7 +183,7 @@ def test_the_mass_of_the_ring_is_rayleighs():
 def test_it_is_not_followed_beyond_its_reach(reach, ends):
     """An undamped gear swings to twice its deformation at rest."""
     static = FORCE / STIFFNESS
-    asked = gear(0.0), Step(FORCE), TIMES, reach * static
+    asked = gear(0.0), STEP, TIMES, reach * static
     motion = jax.jit(integrate)(*asked)
     assert (bool(motion.gone), bool(motion.done)) == (ends, not ends)
 
@@ -178,5 +192,5 @@ def test_it_is_not_followed_beyond_its_reach(reach, ends):
 def test_the_peak_is_that_of_the_motion_and_not_of_the_points(points):
     """An undamped gear swings to twice its deformation at rest."""
     times = np.linspace(0.0, 0.0047, points)
-    found = jax.jit(integrate)(gear(0.0), Step(FORCE), times)
+    found = jax.jit(integrate)(gear(0.0), STEP, times)
     assert float(found.largest) == pytest.approx(2.0 * FORCE / STIFFNESS, rel=1e-3)

@@ -37,8 +37,7 @@ def classes(
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
     all that the readings do not exclude given it and whose curves, each fitted alone,
-    coincide with it. An effect is in one class at most. `posterior` is the probability
-    of each hypothesis, by model of the noise.
+    coincide with it. An effect is in one class at most.
     """
     chance = dict.fromkeys(searched.table.names[:-1], 0.0)
     for key, each in posterior.items():
@@ -65,8 +64,7 @@ def classes(
 def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, " n"]:
     """Return what the base model leaves of an effect of a hypothesis, of unit length.
 
-    At the fitted shape, rows weighted by their stated noise. Zero where the hypothesis
-    has no evidence.
+    Zero where the hypothesis has no evidence.
     """
     table, problem = searched.table, searched.problem
     parts = table.parts.get(key, [])
@@ -82,14 +80,9 @@ def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, "
 class Acting:
     """Draws of one hypothesis and noise model in which the same components act.
 
-    Attributes:
-        weight: their probability.
-        components: that act on the mean reading, sorted.
-        noise: effect on the noise, empty without one.
-        closed: share of the gap's rms that each class closes, and the remainder, by
-            name, shape (d,); empty where no draws were made.
-        carried: share that all effects of the library close together, shape (d,).
-        rms: of the gap [N], shape (d,).
+    On the noise none may act. `closed` are the shares of the rms of the gap [N] that
+    each class and the remainder close, by name, `carried` is that of all effects of the
+    library together; where no draws were made nothing is known of them.
     """
 
     weight: float
@@ -122,8 +115,7 @@ def acting(
 ) -> list[Acting]:
     """Return the components that act in each hypothesis and noise model.
 
-    `posterior` is the probability of each hypothesis, by model of the noise; `class_of`
-    the name of the class of each effect that has one.
+    `class_of` is the name of the class of each effect that has one.
     """
     table, found = searched.table, []
     for key, chance in posterior.items():

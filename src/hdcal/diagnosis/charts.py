@@ -8,15 +8,13 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.loading import movement_words
 from hdcal.diagnosis.gap import GapByRow
-from hdcal.diagnosis.which import ALL, LIKELY, Cause, Which, either
+from hdcal.diagnosis.which import Which, either
 from hdcal.evidence.row_features import half_cycles
 from hdcal.quantities import Quantities
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
     BLUE,
-    GREY,
     ORANGE,
-    SKY,
     Band,
     Bars,
     Chart,
@@ -28,13 +26,11 @@ from hdcal.report.charts.chart_spec import (
     drawn_rows,
 )
 from hdcal.report.item import INTERVAL
-from hdcal.report.words import percent
 
 if TYPE_CHECKING:
     from hdcal.diagnosis.result import HowFar
 
-# Classes that are shown, the least probability of one, and from which on its share of
-# the gap is written with it.
+# Classes that are shown, and the least probability of one.
 _MOST, _LEAST = 8, 0.01
 # With more half cycles than this bands would cover each other: medians stay.
 _MOST_BANDS = 40
@@ -105,47 +101,26 @@ def _gap(
     return band, Line(label=name, x=x[rows], y=middle, colour=colour, width=0.8)
 
 
-def which_chart(which: "Which") -> Chart:
+def which_chart(which: Which) -> Chart:
     """Return the probability of each class of effects, and of anything else."""
     shown = [c for c in which.causes if c.probability >= _LEAST][:_MOST]
-    causes = [c for c in shown if not c.on_noise]
-    noise = [c for c in shown if c.on_noise]
-    bars, at = list[Mark](), 1.0
-    groups = (causes, BLUE), ([which.outside], ORANGE), (noise, GREY)
-    for group, colour in groups:
-        if group:
-            chances = np.array([each.probability for each in group])
-            bars.append(
-                Bars(at=at + np.arange(len(group)), high=chances, colour=colour)
-            )
-            at += len(group)
-    names = [_name(each) for each in (*causes, which.outside, *noise)]
-    return _ranked("probability that it acts", bars, names, (0.0, 1.0))
+    named = {either(cause.members): cause.probability for cause in shown}
+    named["outside the library"] = which.outside.probability
+    return _ranked("probability that it acts", named)
 
 
-def _name(cause: "Cause") -> str:
-    words = either(cause.members) if cause.members else "outside the library"
-    if cause.explains and cause.probability > LIKELY:
-        share = cause.explains.median
-        words += f": {'all' if share >= ALL else percent(share)} of the gap"
-    return words
-
-
-def _ranked(
-    axis: str,
-    bars: list[Mark],
-    names: list[str],
-    limits: tuple[float | None, float | None] = (None, None),
-) -> Chart:
+def _ranked(axis: str, named: dict[str, float]) -> Chart:
     """Return bars with room for long names."""
+    names, high = [*named], np.array([*named.values()])
+    bars = Bars(at=np.arange(1.0, len(names) + 1.0), high=high, colour=BLUE)
     lines = max((len(wrap(name, 40)) for name in names), default=1)
     panel = Panel(
         x="",
         y=axis,
-        marks=bars,
+        marks=[bars],
         names=names,
         horizontal=True,
-        y_limits=limits,
+        y_limits=(0.0, None),
         wide=True,
         height=1.0 + (0.2 + 0.15 * lines) * max(len(names), 2),
     )
@@ -154,14 +129,5 @@ def _ranked(
 
 def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
     """Return what each model leaves, from the straight model to the noise."""
-    rungs = [rung for rung in far.ladder if rung.model != FORMULA]
-    rms = np.array([rung.rms_N for rung in rungs])
-    at, end = np.arange(1.0, len(rms) + 1.0), len(rms)
-    groups = (0, 1, SKY), (1, end - 1, BLUE), (end - 1, end, GREY)
-    bars: list[Mark] = [
-        Bars(at=at[first:last], high=rms[first:last], colour=colour)
-        for first, last, colour in groups
-        if first < last
-    ]
-    axis = load_axis(units, "root mean square of what is left")
-    return _ranked(axis, bars, [rung.model for rung in rungs])
+    rungs = {rung.model: rung.rms_N for rung in far.ladder if rung.model != FORMULA}
+    return _ranked(load_axis(units, "root mean square of what is left"), rungs)

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.data.case import Case
 from hdcal.diagnosis.acting import Acting, acting, classes
 from hdcal.diagnosis.which import (
-    ADEQUATE,
     LIKELY,
-    NAMED,
     ON_NOISE,
     Cause,
     Explanation,
@@ -19,15 +16,16 @@ from hdcal.diagnosis.which import (
     Which,
 )
 from hdcal.evidence.parts import posterior
-from hdcal.evidence.search import Searched, search
+from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
-from hdcal.physics.effect import Effect
 from hdcal.report.item import TAILS, Interval
 
 # By which log evidences are divided. On learning rounds of the blind check, 940 cases,
 # the mean log score grows up to 2.0, by 0.05 nat from here. Above this value fewer than
 # four in five causes of gaps as large as the noise are stated with 90 %.
 TEMPERATURE = 1.6
+# Least p-value of an explanation that fits; from this probability on one is named.
+_ADEQUATE, _NAMED = 0.01, 0.9
 # Probability of the credible set, and draws of the check of an explanation.
 _CREDIBLE, _DRAWS = 0.9, 300
 
@@ -36,14 +34,10 @@ _CREDIBLE, _DRAWS = 0.9, 300
 class Decision:
     """What a case shows about what its base model lacks.
 
-    Attributes:
-        gap: probability that something acts.
-        gap_N: rms of what acts on the mean reading, where it does [N]; None where no
-            draws were made.
-        explanations: all that are possible, the most probable first.
-        hypotheses: probability of each hypothesis on the mean reading and effect on
-            the noise.
-        coarse_step: step of forces that are read coarsely [N]; 0 where they are not.
+    `gap` is the probability that something acts, `gap_N` the rms of what acts on the
+    mean reading where it does, None where no draws were made. `hypotheses` are
+    components on the mean reading with an effect on the noise; `explanations` are all,
+    likeliest first.
     """
 
     gap: float
@@ -55,26 +49,12 @@ class Decision:
 
 
 def decide(
-    case: Case,
-    library: Mapping[str, type[Effect]],
-    *,
-    temperature: float = TEMPERATURE,
-    seed: int = 0,
-) -> Decision:
-    """Decide what acts in a case, of effects by name.
-
-    Log evidences are divided by the temperature.
-
-    Raises:
-        InputError: an effect has no prior.
-    """
-    return decide_searched(search(case, library), temperature=temperature, seed=seed)
-
-
-def decide_searched(
     searched: Searched, *, temperature: float = TEMPERATURE, seed: int = 0
 ) -> Decision:
-    """Decide what acts, given the evidence of all hypotheses."""
+    """Decide what acts, given the evidence of all hypotheses.
+
+    Log evidences are divided by the temperature.
+    """
     rng, table = np.random.default_rng(seed), searched.table
     chance = table.posterior(temperature)
     groups = classes(searched, chance)
@@ -93,12 +73,12 @@ def decide_searched(
     credible = explanations[: int(np.searchsorted(total, _CREDIBLE)) + 1]
     names = [*table.names[:-1], *on_noise]
     which = Which(
-        verdict=_verdict(causes, outside, gap, fits=p_value >= ADEQUATE),
+        verdict=_verdict(causes, outside, gap, fits=p_value >= _ADEQUATE),
         causes=tuple(causes),
         outside=outside,
         explanations=credible,
         inclusion={name: _cause((name,), found).probability for name in names},
-        fits=p_value >= ADEQUATE,
+        fits=p_value >= _ADEQUATE,
         p_value=p_value,
         not_testable=dict(searched.lacking),
     )
@@ -123,7 +103,7 @@ def _verdict(
     if not acting and outside.probability > LIKELY:
         return "unknown"
     acting = acting or likely
-    if not acting or acting[0].probability < NAMED or not fits:
+    if not acting or acting[0].probability < _NAMED or not fits:
         return "ambiguous"
     return "group" if acting[0].merged else "named"
 
@@ -145,13 +125,10 @@ def _cause(members: tuple[str, ...], found: Sequence[Acting]) -> Cause:
 
 def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
     """Return the interval of samples of given total weights, None without any."""
-    samples = [(values, weight) for values, weight in samples if len(values)]
-    if not samples:
+    parts = [(x, np.full(len(x), weight / len(x))) for x, weight in samples if len(x)]
+    if not parts:
         return None
-    values = np.concatenate([values for values, _ in samples])
-    weights = np.concatenate(
-        [np.full(len(values), weight / len(values)) for values, weight in samples]
-    )
+    values, weights = map(np.concatenate, zip(*parts, strict=True))
     order = np.argsort(values)
     weights = weights[order] / weights.sum()
     place = np.cumsum(weights) - 0.5 * weights
@@ -190,9 +167,8 @@ def _hypotheses(
 def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -> float:
     """Return how often noise alone leaves as much structure as the readings do.
 
-    A posterior predictive check. Structure is the largest of the shares of the
-    residuals that the kernels of the remainder span, each in sds of what noise makes
-    it.
+    Structure is the largest of the shares of the residuals that the kernels of the
+    remainder span, each in sds of what noise makes it.
     """
     problem, noise = searched.problem, searched.table.likeliest_noise(key)
     if not searched.kernels:

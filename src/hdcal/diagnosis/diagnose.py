@@ -12,7 +12,7 @@ from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.charts import FORMULA
-from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide_searched
+from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide
 from hdcal.diagnosis.gap import Fitted, closed_on_left_out, fitted, gap_by_row
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
@@ -63,7 +63,7 @@ def diagnose(
     _check(case, effects, seed)
     rng = np.random.default_rng(seed)
     searched = search(case, effects)
-    found = decide_searched(searched, seed=seed)
+    found = decide(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
@@ -155,9 +155,7 @@ def _how_far(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> HowFar:
-    closed, word = None, ""
-    if names:
-        closed, word = closed_on_left_out(searched, fit, names, rng)
+    closed = closed_on_left_out(searched, fit, names, rng) if names else None
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():
         if name != OUTSIDE or len(fit.rms) > 1:
@@ -167,7 +165,7 @@ def _how_far(
     wild = fit.noise.name == OUTLIERS
     noise = "noise without wild readings" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
-    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
+    return HowFar(ladder=tuple(ladder), closed=closed)
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from hdcal.data.records import Records
 from hdcal.evidence.components import Components, components
@@ -12,27 +12,20 @@ from hdcal.evidence.evaluation import select
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Part, join, posterior, sampled_curves
-from hdcal.evidence.row_features import half_cycles, place_in_run
+from hdcal.evidence.row_features import place_in_run
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
-from hdcal.physics.effects.scatter import Scatter
 from hdcal.report.item import TAILS, Interval
 
-# Draws of the gap, and of the share that closes.
-_DRAWS, _SAMPLES = 600, 1000
-# With fewer half cycles all rows are cut into stretches.
-_FEWEST_HALVES = 4
+# Draws of the gap, and of the share that closes; blocks of rows that are left out.
+_DRAWS, _SAMPLES, _BLOCKS = 600, 1000, 6
 
 
 @dataclass(frozen=True)
 class GapByRow:
-    """What the base model leaves of the readings.
+    """What the base model leaves of the readings [N], and draws of the gap [N].
 
-    Attributes:
-        records: the rows that were diagnosed, run after run: all, means of neighbours,
-            or one of several.
-        residual: reading less the base model fitted alone [N], shape (n,).
-        draws: of the gap, over all hypotheses [N], shape (d, n).
+    The rows are those that were diagnosed, run after run: all, or one of several.
     """
 
     records: Records
@@ -44,11 +37,8 @@ class GapByRow:
 class Fitted:
     """The likeliest hypothesis with some effects, fitted to all rows.
 
-    Attributes:
-        noise: its model of the noise.
-        noise_sd: of a typical row [N].
-        rms: what the base model leaves, then with each effect in addition, then with a
-            remainder outside the library [N], by what was added last.
+    `noise_sd` is that of a typical row [N]; `rms` what the base model leaves, then with
+    each effect in addition, then with a remainder [N], by what was added last.
     """
 
     noise: NoiseModel
@@ -81,11 +71,7 @@ def gap_by_row(
 def fitted(
     searched: Searched, posterior_of: Mapping[Names, np.ndarray], names: Sequence[str]
 ) -> Fitted:
-    """Return the likeliest of the hypotheses that contain most of some effects.
-
-    `names` are those of the effects on the mean reading; a hypothesis contains two at
-    most.
-    """
+    """Return the likeliest of the hypotheses that contain most of the named effects."""
     problem, table = searched.problem, searched.table
     key = max(
         posterior_of,
@@ -109,25 +95,23 @@ def fitted(
 
 def closed_on_left_out(
     searched: Searched, fit: Fitted, names: Sequence[str], rng: np.random.Generator
-) -> tuple[Interval | None, str]:
+) -> Interval | None:
     """Return the share of the gap that effects close on rows left out of the fit.
 
-    The rows are left out block by block: half cycles, or stretches where there are few.
-    Base model and effects are fitted to the others, the shapes of the effects included,
-    with the noise of a fit to all. The share is 1 − √(G₁/G₀), G the mean square of what
-    is left beyond the noise.
-
-    Returns:
-        Median and interval over resampled blocks and the error of the noise sd, None
-        where no block shows a gap; and what was left out.
+    A sixth of each run is left out at a time: nothing predicts a run, or a gear,
+    without any row of it. Base model and effects are fitted to the others, the shapes
+    of the effects included, with the noise of a fit to all. The share is 1 − √(G₁/G₀),
+    G the mean square of what is left beyond the noise; its interval is over resampled
+    blocks and the error of the noise sd. None where no block shows a gap.
     """
     problem = searched.problem
     effects = {name: searched.effects[name] for name in names}
-    members = any(issubclass(effect, Scatter) for effect in effects.values())
-    block, word = _blocks(problem, by_member=members)
-    library, count = components(effects, problem), int(block.max()) + 1
+    order = np.argsort(place_in_run(problem.records.run), kind="stable")
+    block = np.empty(len(order), int)
+    block[order] = _BLOCKS * np.arange(len(order)) // len(order)
+    library, rows = components(effects, problem), np.bincount(block).astype(float)
+    count = len(rows)
     table = np.array([_errors(problem, library, fit, block == k) for k in range(count)])
-    rows = np.bincount(block).astype(float)
     picked = rng.multinomial(count, np.full(count, 1.0 / count), _SAMPLES)
     before, after, spread = (picked * rows @ table / (picked @ rows)[:, None]).T
     # The relative error of a noise variance that so many rows determine.
@@ -138,37 +122,19 @@ def closed_on_left_out(
     # end does without it.
     careful = _closed(before - off, after + spread - off)
     if np.isfinite(closed).mean() < 0.5:
-        return None, word
+        return None
     whole = rows @ table / rows.sum()
     middle = float(_closed(whole[0], whole[1]))
     middle = float(np.nanmedian(closed)) if np.isnan(middle) else middle
     low, high = np.nanquantile(careful, TAILS[0]), np.nanquantile(closed, TAILS[2])
     low, high = min(float(low), middle), max(float(high), middle)
-    return Interval(median=middle, lo=low, hi=high), word
+    return Interval(median=middle, lo=low, hi=high)
 
 
 def _closed(before, after):
     with np.errstate(invalid="ignore", divide="ignore"):
         gap = np.where(before > 0.0, before, np.nan)
         return 1.0 - np.sqrt(np.maximum(after, 0.0) / gap)
-
-
-def _blocks(
-    problem: LinearProblem, *, by_member: bool
-) -> tuple[Int[np.ndarray, " n"], str]:
-    """Return the block of each row, and the word for a block."""
-    records = problem.records
-    if by_member:
-        # Nothing predicts a member without any row of it.
-        quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
-        return quarter.astype(int), "a quarter of each run"
-    word = "a half cycle" if "unloading" in records.known else "a stretch of rows"
-    halves = half_cycles(records)
-    if halves[-1] + 1 >= _FEWEST_HALVES:
-        return halves, word
-    rows = len(halves)
-    count = int(np.clip(rows // 3, 2, 6))
-    return np.minimum(np.arange(rows) * count // rows, count - 1), word
 
 
 def _errors(
@@ -179,8 +145,8 @@ def _errors(
 ) -> Float[np.ndarray, " 3"]:
     """Return mean squared errors on some rows of models that were fitted without them.
 
-    In noise variances of a row: the base model's, less the noise and less the variance
-    of the prediction; the same with the effects; and the variance of that prediction.
+    In noise variances: the base model's, less the noise and less the variance of the
+    prediction; the same with the effects; and the variance of that prediction.
     """
     noise, rest = fit.noise, problem.without(left_out)
     others = noise._replace(weight=np.where(left_out, 0.0, noise.weight))

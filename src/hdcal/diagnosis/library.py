@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from hdcal.calibration.known_effects import check_names
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.errors import Finding, InputError
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 
@@ -34,11 +34,13 @@ def library_of(given: Mapping[str, type[Effect]] | None) -> dict[str, type[Effec
     """
     if given is None:
         return dict(EFFECTS)
-    remedy = "Give effects by name, such as hdcal.EFFECTS or a part of it"
-    if not isinstance(given, Mapping):
-        raise InputError([Finding("library", "is no mapping", remedy)])
-    for name, effect in given.items():
-        if not (isinstance(effect, type) and issubclass(effect, Effect)):
-            words = f"{quoted(str(name))} is no class of an effect"
-            raise InputError([Finding("library", words, remedy)])
-    return dict(given)
+    if isinstance(given, Mapping) and all(
+        isinstance(effect, type) and issubclass(effect, Effect)
+        for effect in given.values()
+    ):
+        return dict(given)
+    words, remedy = (
+        "is no mapping of classes of effects",
+        "Give hdcal.EFFECTS or a part",
+    )
+    raise InputError([Finding("library", words, remedy)])

@@ -13,7 +13,6 @@ from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, HdcalError, InputError
-from hdcal.report.item import Item
 from hdcal.report.result import Result
 from hdcal.report.saving import MARKER
 
@@ -26,45 +25,31 @@ Refused = Mapping[str, tuple[Finding, ...]]
 REFUSED = "refused.json"
 
 
-class Row(Item):
-    """One of many cases."""
-
-    case: str
-    verdict: str
-    headline: str
-    cause: str
-    probability: float | None
-    closed: float | None
-
-
 class Diagnoses(Result):
-    """Result of `hdcal diagnose` on many cases.
-
-    Attributes:
-        rows: one for each case that was diagnosed.
-        cases: their verdict.json, by name.
-        refused: what is wrong with the others.
-    """
+    """Result of `hdcal diagnose` on many cases, and what is wrong with refused ones."""
 
     template = "diagnosis/many.md.j2"
-    table = "rows"
 
-    format: Literal["hdcal.verdicts/2"] = "hdcal.verdicts/2"
-    rows: tuple[Row, ...]
+    format: Literal["hdcal.verdicts/3"] = "hdcal.verdicts/3"
     cases: dict[str, dict]
     refused: dict[str, tuple[Finding, ...]]
 
     @property
+    def verdicts(self) -> dict[str, str]:
+        """The verdict on each case, in a word."""
+        return {
+            name: "FAILED" if case["reasons"] else case["which"]["verdict"]
+            for name, case in self.cases.items()
+        }
+
+    @property
     def counts(self) -> Counter[str]:
         """Number of cases with each verdict."""
-        return Counter(row.verdict for row in self.rows)
+        return Counter(self.verdicts.values())
 
 
 def read_cases(paths: Sequence[str], **reading) -> tuple[list[Case], Refused]:
-    """Read every case; one that cannot be used does not stop the others.
-
-    Returns:
-        The cases, with different names; and what is wrong with the others, by path.
+    """Return cases of different names, and what is wrong with the others, by path.
 
     Raises:
         InputError: holds everything that is wrong where no case can be used.
@@ -98,9 +83,7 @@ def all_findings(refused: Refused) -> list[Finding]:
 def diagnose_many(
     cases: Sequence[Case], refused: Refused, folder: Path, *, jobs: int, **how
 ) -> Diagnoses:
-    """Diagnose every case in processes and write its result into a folder of its name.
-
-    Cases have different names; `refused` is what is wrong with the others.
+    """Diagnose cases of different names, each into a folder of its name.
 
     Raises:
         InputError: holds everything that is wrong where no case can be used.
@@ -108,39 +91,26 @@ def diagnose_many(
     tasks = [(case, folder / case.name) for case in cases]
     with progress_bar("diagnosing") as progress:
         outcomes = run_all(partial(_diagnosed, **how), tasks, jobs, progress)
-    by_name = {each.name: out for each, out in zip(cases, outcomes, strict=True)}
-    found = {n: out for n, out in by_name.items() if isinstance(out[0], Row)}
+    by_name = {case.name: out for case, out in zip(cases, outcomes, strict=True)}
+    found = {n: out for n, out in by_name.items() if isinstance(out, dict)}
     refused = {**refused, **{n: o for n, o in by_name.items() if n not in found}}
     if not found:
         raise InputError(all_findings(refused))
-    rows = tuple(row for row, _ in found.values())
     together = Diagnoses(
-        reasons=tuple(f"{r.case}: failed" for r in rows if r.verdict == "FAILED"),
-        rows=rows,
-        cases={name: plain for name, (_, plain) in found.items()},
+        reasons=tuple(f"{n}: failed" for n, case in found.items() if case["reasons"]),
+        cases=found,
         refused=refused,
     )
     (folder / REFUSED).write_text(together.to_json(), "utf-8")
     return together
 
 
-def _diagnosed(case: Case, place: Path, **how) -> tuple:
-    """Return row and verdict.json of a case, or what is wrong with it."""
+def _diagnosed(case: Case, place: Path, **how) -> dict | tuple[Finding, ...]:
+    """Return verdict.json of a case, or what is wrong with it."""
     try:
-        found = diagnose_into(place, case, **how)
+        return diagnose_into(place, case, **how).to_dict()
     except Exception as error:
         return _wrong(case.name, error)
-    which, closed = found.which, found.how_far.closed
-    leading = next((c for c in which.causes if c.explains), which.outside)
-    row = Row(
-        case=case.name,
-        verdict=which.verdict if found.status == "ok" else "FAILED",
-        headline=found.headline,
-        cause=" or ".join(leading.members) or "outside the library",
-        probability=leading.probability,
-        closed=closed and closed.median,
-    )
-    return row, found.to_dict()
 
 
 def diagnose_into(
@@ -154,10 +124,7 @@ def diagnose_into(
     seed: int,
     progress: "Progress | None" = None,
 ) -> "Diagnosis":
-    """Diagnose a case, and write the result once all files are made.
-
-    The library is given as in `choose_library`; a page with figures is the report.
-    """
+    """Diagnose a case, and write the result once all files are made."""
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library
     from hdcal.report.result_folder import page_files
@@ -167,11 +134,7 @@ def diagnose_into(
     files = {"verdict.json": found.to_json().encode()}
     if (average := found.average) is not None:
         from hdcal.inference.posterior_file import FILE_NAME
-        from hdcal.prediction.bands.predict import default_bands
-        from hdcal.report.table_files import columns_csv
 
-        bands = default_bands([*found.posteriors.values()])
-        files["bands.csv"] = columns_csv(dict(bands.to_frame())).encode()
         files[FILE_NAME] = average.to_netcdf()
     if report:
         files |= page_files(found, command)
@@ -182,11 +145,7 @@ def diagnose_into(
 
 
 def _wrong(name: str, error: Exception, *, alone: bool = False) -> tuple[Finding, ...]:
-    """Return what is wrong with a case: bad input, or a defect of hdcal.
-
-    Raises:
-        Exception: the error, unless other cases can continue without it.
-    """
+    """Return what is wrong with a case; raise what stops the other ones too."""
     if isinstance(error, InputError):
         return tuple(error.findings)
     debug = os.environ.get("HDCAL_DEBUG") == "1"

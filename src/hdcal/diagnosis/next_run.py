@@ -1,12 +1,10 @@
 """Suggested runs, ranked by their information about the cause for their effort.
 
 The information is that between the true hypothesis and the readings of a run, which are
-Gaussian under each [nat]. A remainder outside the library predicts nothing and is left
-out.
+Gaussian under each [nat]; a remainder predicts nothing and is left out.
 
-Source:
-    Kolchinsky and Tracey, Entropy 19 (2017): a lower bound of the information from
-    Bhattacharyya distances.
+Source: Kolchinsky and Tracey, Entropy 19 (2017), a lower bound from Bhattacharyya
+distances.
 """
 
 from collections import defaultdict
@@ -37,26 +35,17 @@ _MOST, _LEAST_SHARE, _LEAST_NATS = 6, 0.01, 0.02
 
 
 class NextRun(Item):
-    """One run that a rig can do, and its information.
-
-    Attributes:
-        run: what to do, in words.
-        separates: the two hypotheses that it would separate best.
-        information_nats: expected information about which effect it is.
-        cost: in words, such as "one ramp".
-    """
+    """One run that a rig can do, and the two hypotheses that it separates best."""
 
     run: Words
     separates: tuple[tuple[EffectName, ...], tuple[EffectName, ...]]
     information_nats: float
-    cost: str
 
 
 class Candidate(NamedTuple):
-    """A run in words, its cost, its effort over that of a ramp, and its rows."""
+    """A run in words, its effort over that of a ramp, and its rows."""
 
     words: str
-    cost: str
     effort: float
     records: Records
 
@@ -71,39 +60,34 @@ def candidate_runs(
     near = abs(last - reference_temperature) < 0.5 * _WARMER
     other = last + _WARMER if near else reference_temperature
 
-    def run(words, cost, effort, path, pace=pace, **columns):
-        return Candidate(words, cost, effort, _run(records, path, pace, **columns))
+    def run(words, effort, path, pace=pace, **columns):
+        return Candidate(words, effort, _run(records, path, pace, **columns))
 
-    loop, one, mounting = paths["loop"], "one cycle", "one mounting"
+    loop = paths["loop"]
     if "unloading" not in known:
-        yield run("load and unload at the same rate", one, 1.5, loop)
+        yield run("load and unload at the same rate", 1.5, loop)
     timed = "time" in known
     if timed and "rates" not in known:
-        yield run("load and unload four times faster", one, 1.5, loop, pace / 4.0)
-        slow = "load and unload ten times slower", "one slow cycle", 4.0
-        yield run(*slow, loop, 10.0 * pace)
+        yield run("load and unload four times faster", 1.5, loop, pace / 4.0)
+        yield run("load and unload ten times slower", 4.0, loop, 10.0 * pace)
     if timed and "holds" not in known:
-        words = "load, then hold the top for a minute"
-        yield run(words, "two minutes", 2.0, paths["hold"])
+        yield run("load, then hold the top for a minute", 2.0, paths["hold"])
     if np.ptp(warmth) <= _SAME:
         words = f"load and unload at {other:.0f} °C"
-        yield run(words, "one change of temperature", 6.0, loop, temperature=other)
+        yield run(words, 6.0, loop, temperature=other)
     elif abs(first - last) > _SAME:
         words = f"go back to the first temperature, {first:.0f} °C, and load again"
-        yield run(words, "one change of temperature", 6.0, loop, temperature=first)
+        yield run(words, 6.0, loop, temperature=first)
     words = "re-seat the gear and load again in finer steps at small {displacement}s"
-    yield run(words, mounting, 2.0, paths["fine"])
-    words = "small loops between half and 0.7 of the top"
-    yield run(words, one, 1.5, paths["inner"])
-    words = "load to 1.25 of the tested {displacement}"
-    yield run(words, "one run beyond the tested range", 5.0, paths["beyond"])
+    yield run(words, 2.0, paths["fine"])
+    yield run("small loops between half and 0.7 of the top", 1.5, paths["inner"])
+    yield run("load to 1.25 of the tested {displacement}", 5.0, paths["beyond"])
     if np.ptp(records.angle) < np.pi / 2.0:
         angle = float(records.angle[-1]) + np.pi / 2.0
-        words = "turn the gear by 90° and load again"
-        yield run(words, mounting, 2.0, paths["up"], angle=angle)
+        yield run("turn the gear by 90° and load again", 2.0, paths["up"], angle=angle)
     if "specimens" not in known:
         words, gear = "load a second gear of the same kind", int(records.specimen[0])
-        yield run(words, "one gear", 8.0, paths["up"], specimen=gear + 1)
+        yield run(words, 8.0, paths["up"], specimen=gear + 1)
 
 
 def _paths(records: Records) -> dict[str, np.ndarray]:
@@ -176,9 +160,8 @@ def rank_runs(
             one, two = sorted(np.unravel_index(farthest, apart.shape))
             found = NextRun(
                 run=run.words,
-                separates=_differing(names[one], names[two]),
+                separates=(names[one], names[two]),
                 information_nats=nats,
-                cost=run.cost,
             )
             ranked.append((round(nats / run.effort, 2), found))
     ranked.sort(key=lambda item: -item[0])
@@ -201,12 +184,6 @@ def _likeliest(
         best.remove(())
     total = sum(share[names] for names in best)
     return {names: share[names] / total for names in best}
-
-
-def _differing(one: Names, two: Names) -> tuple[Names, Names]:
-    """Return hypotheses without their common effects, unless one contains the other."""
-    left, right = ({*one} - {*two}), ({*two} - {*one})
-    return (tuple(sorted(left)), tuple(sorted(right))) if left and right else (one, two)
 
 
 def _predicted(

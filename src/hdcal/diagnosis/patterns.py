@@ -52,12 +52,9 @@ _UP, _RISES = ("up", "down"), ("rises", "falls")
 class Seen(Item):
     """A pattern of the readings, whatever its cause.
 
-    Attributes:
-        statement: in words.
-        covariate: on which it depends.
-        size_N: from its lowest to its highest place, simultaneous 95 % interval.
-        p_value: adjusted for all patterns that were tested.
-        material: it is more than 0.025 % of the largest force.
+    The size is that from its lowest to its highest place, a simultaneous interval; the
+    p-value is adjusted for all patterns tested. It is material from 0.025 % of the
+    largest force on.
     """
 
     statement: Words
@@ -69,15 +66,10 @@ class Seen(Item):
 
 @dataclass(frozen=True)
 class Contrast:
-    """One pattern that readings may have.
+    """One pattern that readings may have, and a statement with {way} and {size}.
 
-    Attributes:
-        covariate: on which it depends.
-        column: its shape, shape (n,).
-        ways: the words for {way} where the coefficient is positive, and negative.
-        words: a statement with {way} and {size}.
-        off_line: whether its size is the swing off a straight line over x.
-        share: of the swing that is its size.
+    `ways` are the words for a positive and a negative coefficient. The size is the
+    swing of the column, off a straight line over the stroke if `off_line`.
     """
 
     covariate: str
@@ -85,28 +77,26 @@ class Contrast:
     ways: tuple[str, str]
     words: str
     off_line: bool = True
-    share: float = 1.0
 
     def swing(self, x: np.ndarray) -> float:
         """Return the difference of the highest and the lowest place of the column."""
         column = self.column
         if self.off_line:
             column = column - np.polyval(np.polyfit(x, column, 1), x)
-        return self.share * float(np.ptp(column))
+        return float(np.ptp(column))
 
 
 def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
     side, depth = np.sign(x) if both else np.ones_like(x), np.abs(x)
-    # Through zero a curve swings to both sides; its size is that of one.
-    share, place = (0.5 if both else 1.0), "deformation"
+    place = "deformation"
     words = "the curve {way} with the {displacement}, {size} off a straight line"
-    yield Contrast(place, side * depth**2, ("stiffens", "softens"), words, share=share)
+    yield Contrast(place, side * depth**2, ("stiffens", "softens"), words)
     words = "at small {displacement}s the {load} lies {size} too {way}"
     toe = side * np.maximum(_TOE - depth, 0.0)
-    yield Contrast(place, toe, ("high", "low"), words, False, share)
+    yield Contrast(place, toe, ("high", "low"), words, False)
     words = "at the largest {displacement}s the {load} turns {way} by {size}"
     head = side * np.maximum(depth - _HEAD, 0.0)
-    yield Contrast(place, head, _UP, words, False, share)
+    yield Contrast(place, head, _UP, words, False)
 
 
 def _over_direction(
@@ -142,14 +132,11 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
     words = "from the first reading to the last the {load} {way} by {size}"
     yield Contrast("order", np.linspace(0.0, 1.0, len(x)), _RISES, words)
     # Whole cycles: loading and unloading may differ in slope.
-    cycle = np.asarray(_load_cycle(padded_records(records)))[: len(x)]
+    padded = padded_records(records)
+    cycle = jit(load_cycle)(padded.sense, padded.run, padded.specimen)
+    cycle = np.asarray(cycle)[: len(x)]
     words = "the slope {way} from cycle to cycle, which moves the {load} by {size} "
     yield Contrast("order", (cycle - cycle.mean()) * x, _RISES, words + "in all")
-
-
-@jit
-def _load_cycle(records: Records):
-    return load_cycle(records.sense, records.run, records.specimen)
 
 
 def _held(records: Records) -> np.ndarray:
@@ -221,10 +208,9 @@ def find_patterns(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
         same = contrast.words if contrast.covariate == "direction" else each.name
         once.setdefault(same, each)
     quantile = float(-ndtri((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
-    clearest = sorted(once.values(), key=lambda each: each.p_value)
     return tuple(
         _seen(tried[each.name], each, swing[each.name], quantile, case)
-        for each in clearest
+        for each in sorted(once.values(), key=lambda each: each.p_value)
     )
 
 
@@ -238,8 +224,8 @@ def _found(
     """Search contrasts within runs first, then between runs.
 
     Slope and zero are free; the other columns of the base are held by their priors.
-    Zeros that differ from run to run would pass for noise that is correlated over a
-    long time, of which a loop is a part. So at first each run has a free zero.
+    Zeros that differ from run to run would pass for correlated noise, of which a loop
+    is a part: at first each run has a free zero.
     """
     sd, held = problem.noise_sd / np.asarray(problem.weight), np.eye(base.shape[1])[2:]
 

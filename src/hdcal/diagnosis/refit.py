@@ -1,9 +1,8 @@
 """Calibration of the probable hypotheses by NUTS, each with its probability.
 
-Every hypothesis of 5 % and more is calibrated, whatever the verdict. Where the others
-have more than 2 % together, the likeliest hypothesis with a leftover discrepancy is
-calibrated too and stands for them, as it bends wherever the data let it. Below that the
-model that knows the stiffness least stands for them.
+Those of 5 % and more are calibrated, whatever the verdict. If the others have more than
+2 % together, the likeliest with a leftover discrepancy stands for them, as it bends
+wherever the data let it; else the model that knows the stiffness least.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -31,14 +30,10 @@ _MOST_ROWS = 5_000
 
 @dataclass(frozen=True)
 class Refits:
-    """Calibrated hypotheses.
+    """Calibrated hypotheses that may be used, with probabilities that sum to 1.
 
-    Attributes:
-        posteriors: probability and posterior by hypothesis, of those that may be used;
-            `none` for the plain model, `unknown` for that with a leftover gap. The
-            probabilities sum to 1.
-        left_out: probability without a model among these; None without any model.
-        failures: calibrations that failed their checks, and why.
+    `none` is the plain model, `unknown` that with a leftover gap. `left_out` is the
+    probability without a model among these; `failures` say why others cannot be used.
     """
 
     posteriors: Mapping[str, tuple[float, Posterior]]
@@ -63,22 +58,17 @@ def refit(
     seed: int,
     progress: "Progress | None",
 ) -> Refits:
-    """Calibrate every hypothesis that is probable enough; probabilities sum to 1."""
+    """Calibrate every hypothesis that is probable enough; probabilities sum to 1.
+
+    Progress is that of one calibration after the other.
+    """
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
     probabilities = {_name(key): chance for key, chance in hypotheses.items()}
-    count, finished = len(_probable(probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
-        nonlocal finished
-        parts, before = _parts(name), finished
-
-        def tell(done: int, total: int) -> None:
-            assert progress is not None
-            progress(before * total + done, total * max(count, before + 1))
-
-        finished += 1
+        parts = _parts(name)
         return calibrate(
             case,
             effects=tuple(sorted(parts - {UNKNOWN})),
@@ -86,7 +76,7 @@ def refit(
             adapt_noise=False,
             seed=seed,
             registry=library,
-            progress=progress and tell,
+            progress=progress,
         )
 
     return weighed(probabilities, calibrated)

@@ -31,12 +31,8 @@ from hdcal.report.result import Result
 class Gap(Item):
     """Whether model and readings part, and by how much.
 
-    Attributes:
-        probability: that something acts which the base model lacks.
-        rms_N: of the gap over the rows, where there is one.
-        noise_sd_N: of a reading, given the likeliest explanation.
-        share_of_full_scale: rms over the largest force.
-        correlation: of the noise of neighbouring readings.
+    The rms is that over the rows, where there is a gap; the correlation that of the
+    noise of neighbouring readings.
     """
 
     probability: Probability
@@ -54,18 +50,14 @@ class Rung(Item):
 
 
 class HowFar(Item):
-    """How far the gap closes.
+    """How far the gap closes, from the formula alone down to the noise.
 
-    Attributes:
-        ladder: from the formula alone down to the noise.
-        closed: share of the gap that the acting effects close on rows that they were
-            not fitted to; None without any.
-        left_out: what was left out of each fit.
+    `closed` is the share that the acting effects close on rows that they were not
+    fitted to, None without any.
     """
 
     ladder: tuple[Rung, ...]
     closed: Interval | None
-    left_out: str
 
     @property
     def share(self) -> str:
@@ -81,7 +73,7 @@ class Refit(Item):
 
 
 class Data(Item):
-    """Which data they were; rows or means of neighbours were diagnosed."""
+    """Which data they were."""
 
     name: str
     rows: Count
@@ -93,19 +85,9 @@ class Data(Item):
 class Diagnosis(Result):
     """Result of `hdcal diagnose` on one case; verdict.json.
 
-    Attributes:
-        gap: whether there is one.
-        seen: patterns of the readings whatever their cause, the clearest first.
-        which: effects that cause it.
-        how_far: it closes once they are added.
-        next_test: suggested runs, the most informative for their effort first.
-        refits: calibrated models, the most probable first; none of a quick diagnosis.
-        left_out: hypotheses without a separate calibration.
-        stiffness_N_per_mm: as read, over the calibrated models.
-        coarse_step_N: step of forces that are read coarsely; 0 where they are not.
-        library: names of the effects that were considered.
-        rows: gap and residual of each.
-        posteriors: the calibrated models with their probabilities.
+    The clearest patterns, the most informative runs for their effort and the most
+    probable models come first; a quick diagnosis has no calibrated models. `left_out`
+    are hypotheses without one.
     """
 
     template = "diagnosis/report.md.j2"

@@ -9,16 +9,11 @@ from hdcal.evidence.noise_models import GROWING, OUTLIERS
 from hdcal.report.item import EffectName, Interval, Item, Probability, Words
 from hdcal.report.words import label
 
-# From these probabilities on an effect is reported as acting, and as named.
-LIKELY, NAMED = 0.5, 0.9
+# From this probability on an effect is reported as acting.
+LIKELY = 0.5
 # A gap matters from this rms on, as a share of the largest force: the error of
 # interpolation that ISO 376 allows its best class of force gauges, 00.
 MATTERS = 2.5e-4
-# Least p-value of an explanation that fits.
-ADEQUATE = 0.01
-# From this share on an effect explains all of the gap, and below the other nothing
-# that counts.
-ALL, _LITTLE = 0.99, 0.01
 # Names of a class in a sentence: where there are more, two and the number of others.
 _MOST = 3
 _WORDS = {
@@ -53,23 +48,17 @@ def either(members: Sequence[str]) -> str:
 
 def share_words(share: Interval) -> str:
     """Return a share of the gap with its interval."""
-    ends = [round(100.0 * end) for end in (share.lo, share.hi)]
-    if share.median >= ALL:
-        least = f" (at least {ends[0]} %)" if ends[0] < 100 else ""
-        return f"all of the gap{least}"
-    if share.hi < 1.5 * _LITTLE:
-        return "less than 2 % of the gap"
-    return f"{round(100.0 * share.median)} % ({ends[0]} … {ends[1]} %) of the gap"
+    median, low, high = (
+        f"{end:.0%}"[:-1] for end in (share.median, share.lo, share.hi)
+    )
+    return f"{median} % ({low} … {high} %) of the gap"
 
 
 class Cause(Item):
     """Effects that this loading cannot separate, the likeliest first.
 
-    Attributes:
-        members: their names; none of something outside the library.
-        probability: that one of them acts, alone, in a pair, or with a remainder.
-        explains: share of the gap's rms that they close where they act; None of effects
-            on the noise.
+    None are something outside the library. The probability is that one of them acts;
+    they then explain a share of the gap's rms, effects on the noise None.
     """
 
     members: tuple[EffectName, ...]
@@ -102,12 +91,9 @@ class Cause(Item):
 
 
 class Explanation(Item):
-    """Effects that together explain the readings.
+    """Effects that together explain the readings; none where nothing acts.
 
-    Attributes:
-        effects: none where nothing acts.
-        outside: whether they leave most of the gap to something outside the library.
-        probability: of this explanation.
+    `outside`: they leave most of the gap to something outside the library.
     """
 
     effects: tuple[EffectName, ...]
@@ -130,14 +116,9 @@ class Explanation(Item):
 class Which(Item):
     """Which effects cause the gap.
 
-    Attributes:
-        verdict: in a word.
-        causes: classes of effects, the most probable first.
-        explanations: the smallest set of them with 90 %.
-        inclusion: probability that each effect acts.
-        fits: whether the likeliest explanation fits.
-        p_value: of the check of its residuals.
-        not_testable: effects that predict nothing here, with what was not measured.
+    `causes` are classes of effects, `explanations` the smallest set with 90 %; `fits`
+    and `p_value` check the residuals of the likeliest. Effects that are not testable
+    predict nothing here, for what was not measured.
     """
 
     verdict: VerdictWord

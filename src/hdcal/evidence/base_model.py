@@ -26,9 +26,9 @@ def moments(priors: Mapping[str, Prior], name: str) -> tuple[float, float]:
 def stiffness_prior(
     case: Case, priors: Mapping[str, Prior]
 ) -> tuple[float, float, float]:
-    """Return the prior of the log stiffness as read, gauge gains included.
+    """Return mean and sd of the log stiffness as read [N/mm], and that at K = 1.
 
-    Its mean and sd [log N/mm], and the stiffness at K = 1 [N/mm].
+    The sd has the gauge gains in it.
     """
     (log_k, k_sd), (log_e, e_sd) = (_log_moments(priors, name) for name in ("K", "E0"))
     formula = float(THEORIES[case.gear.theory](case.gear.geometry, np.exp(log_e)))
@@ -54,10 +54,7 @@ def base_at(
     stiffness: float | None,
     expected: float,
 ) -> Base:
-    """Return the base parameters, the stiffness [N/mm] by least squares unless given.
-
-    The expected stiffness takes the place of one that is not positive.
-    """
+    """Return the base parameters, the stiffness by least squares unless given."""
     names = ("alpha", "deformation_offset", "force_offset")
     alpha, zero, offset = (moments(priors, name)[0] for name in names)
     if stiffness is None:

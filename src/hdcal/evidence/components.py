@@ -52,10 +52,7 @@ _BLOCK, _MOST_VALUES = 64, 2**22
 def lacking(
     library: Mapping[str, type[Effect]], records: Records
 ) -> dict[str, tuple[str, ...]]:
-    """Return the columns that effects need and that were not measured.
-
-    An effect with any of them predicts nothing for the rows.
-    """
+    """Return the columns that effects need and that were not measured."""
     known, found = records.known, {}
     for name, effect in library.items():
         columns = {_COLUMNS[n] for n in effect.needs - known if n in _COLUMNS} - known
@@ -66,14 +63,7 @@ def lacking(
 
 @dataclass(frozen=True)
 class Components:
-    """Effects of a library on the mean reading.
-
-    Attributes:
-        names: of the effects.
-        grids: parameter values of each effect; None of members that differ.
-        atoms: of the effects with one amplitude.
-        spaces: of the others.
-    """
+    """Effects of a library on the mean reading; scatter of members has no grid."""
 
     names: tuple[str, ...]
     grids: tuple[ParameterGrid | None, ...]
@@ -233,12 +223,7 @@ def effect_curves(
 ) -> np.ndarray:
     """Return the effect's contribution to the mean reading [N], shape (g, n).
 
-    Args:
-        effect: the effect.
-        values: of every parameter, each of shape (g,).
-        base: the force model about which it acts.
-        padded: the rows, from `padded_records`; all of them are predicted.
-        reading: how the rig reads.
+    `values` are those of every parameter, each of shape (g,); `padded` are all rows.
     """
     block = int(np.clip(_MOST_VALUES // len(padded.force), 1, _BLOCK))
     table = {name: np.asarray(column, float) for name, column in values.items()}

@@ -20,8 +20,6 @@ _TOLERANCES = np.array([0.0, 0.1, 0.2])
 _TOLERANCE_WEIGHTS = np.array([0.4, 0.3, 0.3])
 # Most columns of a narrow space. Padded to the widest ones most would be padding.
 _NARROW = 4
-# Models of the noise whose whitened curves are kept: those of pairs.
-_KEPT = 2
 # Atoms of each effect that are evaluated given tolerances and contexts.
 _CHOSEN = 8
 
@@ -30,11 +28,8 @@ _CHOSEN = 8
 class Selection:
     """Atoms and spaces that are compared given every context.
 
-    Attributes:
-        atoms: the most probable ones, with the weight of all.
-        tolerance: columns of their shapes' tolerance at a relative sd of 1, (m, l, n).
-        spaces: effects with several columns, and kernels; wide ones first.
-        names: of all components, the remainder last.
+    `atoms` are the most probable ones, with the weight of all; `tolerance` are columns
+    of their shapes' tolerance at a relative sd of 1. The remainder is the last name.
     """
 
     problem: LinearProblem
@@ -42,12 +37,22 @@ class Selection:
     tolerance: Float[np.ndarray, "m l n"]
     spaces: tuple[Space, ...]
     names: tuple[str, ...]
-    _white: dict[tuple, tuple[Block, Block, Block]] = field(
-        init=False, default_factory=dict
-    )
+    _blocks: tuple[Block, Block, Block] = field(init=False)
 
     def __post_init__(self) -> None:
         self.spaces = tuple(sorted(self.spaces, key=_is_narrow))
+        atoms, shape = self.atoms, (len(self.atoms.owner), len(_TOLERANCES))
+        narrow = [space for space in self.spaces if _is_narrow(space)]
+        wide, rows = self.spaces[: len(self.spaces) - len(narrow)], len(self.problem.y)
+        each = Block(
+            atoms.owner,
+            atoms.amplitude,
+            np.broadcast_to(_TOLERANCES**2, shape),
+            atoms.log_weight[:, None] + np.log(_TOLERANCE_WEIGHTS),
+            *(atoms.offset, atoms.slope, self.tolerance),
+        )
+        padded = _padded(wide, MOST_COLUMNS, rows), _padded(narrow, _NARROW, rows)
+        self._blocks = each, *padded
 
     def evaluate(
         self,
@@ -56,15 +61,11 @@ class Selection:
         extra: Sequence[Space] = (),
         only: set[int] | None = None,
     ) -> "Evaluated":
-        """Evaluate every item, or those of some components.
-
-        `extra` are further narrow spaces of the remainder, that depend on the context.
-        """
+        """Evaluate all items, or those of some components, and more narrow spaces."""
         projection = Projection(self.problem, noise, context)
-        atoms, wide, narrow = self._whitened(projection)
-        empty = np.zeros((0, len(self.problem.y)))
-        nothing = Space(-1, empty, np.ones(1), np.zeros(1))
-        more = _padded([*extra, nothing], _NARROW, projection)
+        (atoms, wide, narrow), rows = self._blocks, len(self.problem.y)
+        nothing = Space(-1, np.zeros((0, rows)), np.ones(1), np.zeros(1))
+        more = _padded([*extra, nothing], _NARROW, rows)
         narrow = jax.tree.map(lambda *parts: np.concatenate(parts), narrow, more)
         tables = (projection.evaluate(each, only)[0] for each in (wide, narrow))
         spaces = np.concatenate([*tables])
@@ -77,36 +78,14 @@ class Selection:
             extra=tuple(extra),
         )
 
-    def _whitened(self, projection: Projection) -> tuple[Block, Block, Block]:
-        """Return what does not depend on the context, kept for the last models."""
-        noise = projection.noise
-        key = noise.name, noise.correlation, noise.weight.tobytes()
-        if key not in self._white:
-            atoms, shape = self.atoms, (len(self.atoms.owner), len(_TOLERANCES))
-            narrow = [space for space in self.spaces if _is_narrow(space)]
-            wide = self.spaces[: len(self.spaces) - len(narrow)]
-            self._white[key] = (
-                projection.block(
-                    atoms.owner,
-                    atoms.amplitude,
-                    np.broadcast_to(_TOLERANCES**2, shape),
-                    atoms.log_weight[:, None] + np.log(_TOLERANCE_WEIGHTS),
-                    *(atoms.offset, atoms.slope, self.tolerance),
-                ),
-                _padded(wide, MOST_COLUMNS, projection),
-                _padded(narrow, _NARROW, projection),
-            )
-        self._white = dict([*self._white.items()][-_KEPT:])
-        return self._white[key]
-
 
 def _is_narrow(space: Space) -> bool:
     return len(space.columns) <= _NARROW
 
 
-def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> Block:
+def _padded(spaces: Sequence[Space], width: int, rows: int) -> Block:
     """Return spaces of at most so many columns; padded scales have no weight."""
-    count, rows = len(spaces), len(projection.problem.y)
+    count = len(spaces)
     columns = np.zeros((count, width, rows))
     scale = np.ones((count, len(STEPS)))
     log_weight = np.full_like(scale, -np.inf)
@@ -120,19 +99,14 @@ def _padded(spaces: Sequence[Space], width: int, projection: Projection) -> Bloc
     amplitude = Amplitudes(-np.inf * one, np.inf * one, none, one, height)
     owner = np.array([space.owner for space in spaces], int)
     curves = no_curve, no_curve, columns
-    return projection.block(owner, amplitude, scale**2, log_weight, *curves)
+    return Block(owner, amplitude, scale**2, log_weight, *curves)
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Evidence of all items given one context.
+    """Log evidence of all items given one context, and of the context alone (`none`).
 
-    Attributes:
-        none: log evidence of the context alone.
-        atoms: those with an amplitude.
-        spaces: log evidence of the others at each scale, `extra` last.
-        space_owner: component of each space.
-        extra: spaces that belong to this context.
+    `extra` are the last of the spaces: those that belong to this context.
     """
 
     selection: Selection
@@ -214,9 +188,7 @@ def _space_part(space: Space, place: tuple[int, int], spread: float) -> Part:
         mean=np.zeros(count),
         sd=np.full(count, space.scale[place[1]]),
         loose=fixed,
-        one_sided=False,
         shape=space.shape,
-        chord=(0.0, 1.0),
         place=place,
         spread=spread,
         levels=((1.0, fixed),),
@@ -230,11 +202,7 @@ def select(
     kernels: Sequence[Space],
     names: tuple[str, ...],
 ) -> Selection:
-    """Return the most probable atoms of each effect, with the weight of all of them.
-
-    Atoms are compared over all models of the noise. `names` are those of all
-    components, the remainder last.
-    """
+    """Return the most probable atoms of each effect over all noise models."""
     atoms, spaces = effects.atoms, (*effects.spaces, *kernels)
     if not len(atoms.owner):
         tolerance = np.zeros((0, *problem.tolerance.shape))

@@ -16,14 +16,10 @@ MOST_COLUMNS = 24
 
 
 class Amplitudes(NamedTuple):
-    """Priors of the amplitudes of items, each of shape (m,).
+    """Priors of the amplitudes of items.
 
-    The density is exp(log_height − precision · (a − mean)² / 2) from low to high.
-
-    Attributes:
-        mean: centre of the normal.
-        precision: of the normal; 0 where the density is flat.
-        log_height: log density at the centre.
+    The density is exp(log_height − precision · (a − mean)² / 2) from low to high; a
+    precision of 0 makes it flat.
     """
 
     low: Float[np.ndarray, " m"]
@@ -36,14 +32,9 @@ class Amplitudes(NamedTuple):
 class Atoms(NamedTuple):
     """Atoms of all effects.
 
-    Attributes:
-        owner: index of the effect, shape (m,).
-        shape: index of the point of its shape parameters, shape (m,).
-        curve: index of its curve, shape (m,).
-        amplitude: priors of the amplitudes.
-        log_weight: log prior probability of each atom of its effect, shape (m,).
-        offset: contribution of each curve at amplitude 0 [N], shape (c, n).
-        slope: contribution per unit of the amplitude [N], shape (c, n).
+    `owner`, `shape` and `curve` are indices of the effect, the point of its shape
+    parameters and its curve: offset + slope · amplitude [N]. The weight is the log
+    prior probability of an atom given its effect.
     """
 
     owner: Int[np.ndarray, " m"]
@@ -73,15 +64,10 @@ class Atoms(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Columns whose coefficients have one prior sd, on a grid of it.
+    """Columns whose coefficients have one prior sd, on a grid `scale` of it.
 
-    Attributes:
-        owner: index of the component.
-        columns: contribution per unit of each coefficient [N], shape (j, n).
-        scale: values of the prior sd, shape (t,).
-        log_weight: log prior probability of each, shape (t,).
-        shape: index of the point of the shape parameters of an effect with several
-            amplitudes; −1 of the others.
+    `shape` is the point of the shape parameters of an effect with several amplitudes,
+    −1 of the other components; columns are in newtons per unit.
     """
 
     owner: int

@@ -19,12 +19,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
 from hdcal.data.scatter import left_of_lines
-from hdcal.evidence.base_model import (
-    base_at,
-    base_columns,
-    run_columns,
-    stiffness_prior,
-)
+from hdcal.evidence import base_model
 from hdcal.evidence.row_features import take_rows, tolerance_functions
 from hdcal.inference import distributions
 from hdcal.inference.force_model import serial_correlation
@@ -41,13 +36,10 @@ _LEAST_NOISE = 1e-6
 
 @dataclass(frozen=True)
 class LinearProblem:
-    """Rows of one case with the columns of its base model.
+    """Rows of one case, run after run, with the columns of its base model.
 
     Attributes:
-        records: rows, run after run.
-        reading: how the rig reads.
         base: parameters about which effects are evaluated.
-        priors: by site name.
         y: force less the prior mean of the base model [N].
         X: columns of the base model [N per prior sd].
         noise_sd: reference noise sd [N]; the prior sds of b are multiplied by the noise
@@ -55,8 +47,7 @@ class LinearProblem:
         before: index of the row before in the same run, −1 for a run's first.
         weight: one over the relative noise sd that the file states for each row.
         tolerance: smooth functions by which an effect's shape may deviate.
-        log_shift: prior mean of the log stiffness less that of `base`.
-        log_sd: prior sd of the log stiffness.
+        log_shift: prior mean of the log stiffness less that of `base`; `log_sd` its sd.
         offsets: number of columns of X that are offsets of runs; their priors are so
             wide that each uses up a row.
     """
@@ -134,10 +125,9 @@ class LinearProblem:
 
 
 def padded_records(records: Records) -> Records:
-    """Return records of a length that many cases share.
+    """Return records of a length that many cases share, for one executable.
 
-    `known` is left out: everything would be compiled anew for it, and only the `needs`
-    of effects depend on it.
+    `known` is left out: only the `needs` of effects depend on it.
     """
     return pad_records(replace(records, known=frozenset()))
 
@@ -167,12 +157,14 @@ def linear_problem(
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
     least = max(least, case.gear.force_resolution / np.sqrt(12.0))
     noise_sd = float(max(noise_sd or _noise_sd(records, least), least))
-    log_mean, log_sd, _ = stiffness_prior(case, priors)
-    base = base_at(records, reading, priors, noise_sd, stiffness, np.exp(log_mean))
-    columns = base_columns(records, reading, priors, base, log_sd)
+    log_mean, log_sd, _ = base_model.stiffness_prior(case, priors)
+    base = base_model.base_at(
+        records, reading, priors, noise_sd, stiffness, np.exp(log_mean)
+    )
+    columns = base_model.base_columns(records, reading, priors, base, log_sd)
     log_shift = log_mean - float(np.log(float(base.stiffness)))
     mean = base.force_offset + columns[:, 0] / log_sd * (1.0 + log_shift)
-    offsets = run_columns(records) if free_runs else np.zeros((len(mean), 0))
+    offsets = base_model.run_columns(records) if free_runs else np.zeros((len(mean), 0))
     return LinearProblem(
         records=records,
         reading=reading,
@@ -191,10 +183,7 @@ def linear_problem(
 
 
 def _noise_sd(records: Records, least: float) -> float:
-    """Return a first estimate of the noise sd [N].
-
-    The pilot fit passes through few rows exactly; then a straight line gives it.
-    """
+    """Return a first noise sd [N]; where the pilot fit is exact, that of lines."""
     found = pilot_fit(records).noise_sd
     if found > least:
         return found

@@ -27,13 +27,8 @@ _STEPS = 3
 class Products(NamedTuple):
     """Inner products of items in whitened rows, less what the base explains.
 
-    Attributes:
-        ee: of the error, the readings less o, with itself, shape (m,).
-        eu: of error and slope, shape (m,).
-        uu: of the slope with itself, shape (m,).
-        te: of each principal axis of L with the error, shape (m, j).
-        tu: of each axis with the slope, shape (m, j).
-        square: squared length of each axis, shape (m, j).
+    Of the error e, the readings less o, the slope u and each principal axis t of L.
+    `square` is the squared length of each axis.
     """
 
     ee: Float[np.ndarray, " m"]
@@ -45,12 +40,10 @@ class Products(NamedTuple):
 
 
 class Marginal(NamedTuple):
-    """Evaluated items, each of shape (m, t).
+    """Log evidence of items, and their amplitudes given the noise sd.
 
-    Attributes:
-        log_evidence: log marginal likelihood, with a prior weight where one is stated.
-        mean: of the amplitude given the noise sd, before its bounds.
-        sd: of the amplitude, likewise.
+    The amplitudes are before any bounds; the evidence has a prior weight where one is
+    stated.
     """
 
     log_evidence: Float[np.ndarray, "m t"]
@@ -71,9 +64,7 @@ class _Given(NamedTuple):
 class _Loose:
     """The loose columns of items, at prior variances of their coefficients.
 
-    Attributes:
-        products: of the items.
-        lam: prior variance times squared length of each axis, shape (m, t, j).
+    `lam` is the prior variance times the squared length of each axis, shape (m, t, j).
     """
 
     def __init__(self, products: Products, variance: Float[np.ndarray, "m t"]):
@@ -92,18 +83,11 @@ class _Loose:
         return _Given(log_det, all_ee - ee, all_eu - eu, all_uu - uu, used)
 
 
-class _Amplitude(NamedTuple):
-    """The normal factor of an amplitude in the likelihood times its prior."""
-
-    precision: np.ndarray
-    score: np.ndarray
-    mean: np.ndarray
-
-
-def _amplitude(given: _Given, variance, prior: Amplitudes) -> _Amplitude:
+def _amplitude(given: _Given, variance, prior: Amplitudes):
+    """Return precision, score and mean of an amplitude: likelihood times prior."""
     precision = given.uu / variance + prior.precision + _TINY
     score = given.eu / variance + prior.precision * prior.mean
-    return _Amplitude(precision, score, score / precision)
+    return precision, score, score / precision
 
 
 def log_marginal(
@@ -135,8 +119,8 @@ def log_marginal(
     value += np.log(_WEIGHTS)[:, None, None] + nodes**2
     log_evidence = np.logaddexp.reduce(value, axis=0)
     log_evidence += 0.5 * np.log(2.0 * width**2) - 0.5 * count * _LOG_2PI
-    found = _amplitude(loose.given(noise), noise, prior)
-    return Marginal(log_evidence, found.mean, found.precision**-0.5)
+    precision, _, mean = _amplitude(loose.given(noise), noise, prior)
+    return Marginal(log_evidence, mean, precision**-0.5)
 
 
 def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes):
@@ -145,8 +129,7 @@ def _likeliest_variance(count: int, loose: _Loose, prior: Amplitudes):
     variance = np.broadcast_to(square / count, loose.lam.shape[:-1])
     for _ in range(_STEPS):
         given = loose.given(variance)
-        size = _amplitude(given, variance, prior).mean
-        size = np.clip(size, prior.low, prior.high)
+        size = np.clip(_amplitude(given, variance, prior)[2], prior.low, prior.high)
         left = given.ee - 2.0 * size * given.eu + size**2 * given.uu
         free = np.maximum(count - given.used, 1.0)
         variance = np.maximum(left, 1e-9 * square) / free

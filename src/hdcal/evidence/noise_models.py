@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 from scipy.special import betaln, entr, expit
 from scipy.stats import binomtest
 
-from hdcal.data.records import Records
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
 from hdcal.evidence.row_features import half_cycle_rows
@@ -33,13 +32,10 @@ _MEDIAN_TO_SD = 1.4826
 
 
 class NoiseModel(NamedTuple):
-    """One model of the noise.
+    """One model of the noise; the name is empty for equal noise.
 
-    Attributes:
-        name: of the effect on the noise; empty for equal noise.
-        weight: one over the relative noise sd of each row, shape (n,).
-        correlation: AR(1) coefficient.
-        log_prior: log prior odds, and all that does not depend on the mean reading.
+    The weight of a row is one over its relative noise sd. `log_prior` has the log prior
+    odds, and all that does not depend on the mean reading.
     """
 
     name: str
@@ -48,22 +44,17 @@ class NoiseModel(NamedTuple):
     log_prior: float
 
 
-def noise_correlations(records: Records) -> Float[np.ndarray, " r"]:
-    """Return the AR(1) coefficients of the noise that are integrated over.
-
-    Where half cycles have many rows two larger coefficients are added, up to the one
-    whose correlation lasts for a fifth of a half cycle.
-    """
-    longest = min(np.exp(-_SPANS / half_cycle_rows(records)), _LARGEST)
-    if longest < _WORTHWHILE:
-        return np.array(_CORRELATIONS)
-    middle = np.exp(-np.sqrt(np.log(_CORRELATIONS[-1]) * np.log(longest)))
-    return np.array([*_CORRELATIONS, middle, longest])
-
-
 def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
-    """Return noise that is equal in all rows, a model for each correlation."""
-    correlations = noise_correlations(problem.records)
+    """Return noise that is equal in all rows, a model for each correlation.
+
+    Where half cycles have many rows two larger correlations are added, up to the one
+    that lasts for a fifth of a half cycle.
+    """
+    correlations = [*_CORRELATIONS]
+    longest = min(np.exp(-_SPANS / half_cycle_rows(problem.records)), _LARGEST)
+    if longest >= _WORTHWHILE:
+        middle = np.exp(-np.sqrt(np.log(_CORRELATIONS[-1]) * np.log(longest)))
+        correlations += [middle, longest]
     log_prior = -float(np.log(len(correlations)))
     return [NoiseModel("", problem.weight, float(c), log_prior) for c in correlations]
 
@@ -109,10 +100,7 @@ def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel
 
 
 class _Fit(NamedTuple):
-    """An EM fit of outliers: its bound, weights of rows, and the terms they leave.
-
-    And the errors of the rows that are wild, zero of the others [N], shape (n,).
-    """
+    """An EM fit of outliers; `wild` are errors of wild rows [N], else 0."""
 
     bound: float
     weight: Float[np.ndarray, " n"]
@@ -127,11 +115,10 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    There is none where wild rows agree with their neighbours: that is structure. The
-    probabilities that rows are wild come from an EM fit. With any such probabilities
-    the evidence of every hypothesis is a lower bound, which is tight where rows are
-    clearly wild or clearly not. `fitted` maps weights of rows to the mean reading given
-    some hypothesis. No correlation is tried as well.
+    There is none where wild rows agree with their neighbours: that is structure. With
+    any probabilities that rows are wild the evidence of every hypothesis is a lower
+    bound, tight where rows are clearly wild or not; these come from an EM fit. `fitted`
+    maps weights of rows to the mean reading given some hypothesis.
     """
     quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
     ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
@@ -169,10 +156,7 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
 
 
 def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
-    """Whether wild rows err too often to the same side as wild rows before them.
-
-    The errors of rows that are not wild are 0.
-    """
+    """Whether wild rows err too often to the same side as wild rows before them."""
     pairs = wild * np.where(before >= 0, wild[before], 0.0)
     same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))
     found = all_pairs and binomtest(same, all_pairs, 0.5, "greater").pvalue < _CHANCE

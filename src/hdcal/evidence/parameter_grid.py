@@ -32,13 +32,9 @@ _LEAST = 1e-300
 class ParameterGrid:
     """Shape points and amplitude prior of one effect.
 
-    Attributes:
-        effect: the effect.
-        amplitudes: names of its amplitudes; several only where it is linear in them.
-        shapes: values of the shape parameters at each shape point, by name.
-        prior: of the (first) amplitude.
-        mean: of a normal prior of the amplitude, else 0.
-        sd: of the amplitude's prior; of a half-normal one, its scale.
+    There are several amplitudes only where the effect is linear in them; they share the
+    prior of the first. The mean is that of a normal prior, else 0; the sd of a half-
+    normal prior is its scale.
     """
 
     effect: type[Effect]

@@ -13,12 +13,7 @@ from hdcal.evidence.noise_models import NoiseModel
 
 
 class Context(NamedTuple):
-    """What is taken into the base given which items are evaluated.
-
-    Attributes:
-        offset: fixed contribution [N].
-        columns: Gaussian columns [N per sd].
-    """
+    """A fixed contribution [N] and Gaussian columns [N per sd] that join the base."""
 
     offset: Float[np.ndarray, " n"]
     columns: Float[np.ndarray, "c n"]
@@ -28,12 +23,8 @@ class Part(NamedTuple):
     """One component at its most probable item: offset + columns · a + loose columns.
 
     Attributes:
-        component: index of the component.
-        offset: fixed contribution [N], shape (n,).
-        columns: contribution per unit of a [N], shape (j, n).
-        mean: of a, as the item alone has it, shape (j,).
-        sd: of a, likewise.
-        loose: columns of the shape's tolerance [N per sd], shape (l, n).
+        mean: of a, as the item alone has it.
+        loose: columns of the shape's tolerance [N per sd].
         one_sided: whether a is not negative.
         shape: index of the point of the shape parameters; −1 without one.
         chord: two amplitudes between which one column is exact.
@@ -48,12 +39,12 @@ class Part(NamedTuple):
     mean: Float[np.ndarray, " j"]
     sd: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
-    one_sided: bool
     shape: int
-    chord: tuple[float, float]
     place: tuple[int, int] | None
     spread: float
     levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
+    one_sided: bool = False
+    chord: tuple[float, float] = (0.0, 1.0)
 
     @property
     def width(self) -> int:
@@ -83,9 +74,7 @@ def merged(parts: Sequence[Part]) -> Part:
 class DrawnCurves(NamedTuple):
     """Draws of what the base model leaves of each part [N].
 
-    Attributes:
-        whole: the part, the deviation of its shape included, shape (k, d, n).
-        own: with the shape of the library, shape (k, d, n).
+    `whole` has the deviation of the shape; `own` has the shape of the library.
     """
 
     whole: Float[np.ndarray, "k d n"]
@@ -94,22 +83,16 @@ class DrawnCurves(NamedTuple):
 
 def join(problem: LinearProblem, parts: Sequence[Part]) -> Context:
     """Return several parts as one context."""
-    contexts = [part.context() for part in parts]
-    none = np.zeros((0, len(problem.y)))
-    return Context(
-        np.sum([none.sum(axis=0), *(each.offset for each in contexts)], axis=0),
-        np.concatenate([none, *(each.columns for each in contexts)]),
-    )
+    none = Context(np.zeros(len(problem.y)), np.zeros((0, len(problem.y))))
+    offsets, columns = zip(none, *(part.context() for part in parts), strict=True)
+    return Context(np.sum(offsets, axis=0), np.concatenate(columns))
 
 
 class LinearPosterior(NamedTuple):
     """Gaussian posterior of the coefficients of base and parts, in prior sds.
 
-    Attributes:
-        mean: shape (p,).
-        factor: F with covariance F'F, shape (p, p).
-        columns: of the coefficients, base first, shape (n, p).
-        offset: fixed contribution of the parts [N], shape (n,).
+    The covariance is F'F of `factor` F; `columns` are those of the base and then of the
+    parts, `offset` is the fixed contribution of the parts [N].
     """
 
     mean: Float[np.ndarray, " p"]
@@ -209,10 +192,7 @@ def _drawn(
 def mean_curves(
     problem: LinearProblem, noise: NoiseModel, parts: Sequence[Part]
 ) -> Float[np.ndarray, "k n"]:
-    """Return what the base model leaves of each part at its posterior mean.
-
-    Rows are weighted by their stated noise.
-    """
+    """Return what the base leaves of each part's mean, rows by stated noise."""
     found = posterior(problem, noise, parts)
     curves = [
         part.context().offset + found.columns[:, place] @ found.mean[place]

@@ -15,20 +15,7 @@ from hdcal.inference.force_model.serial_correlation import log_volume
 
 
 class Block(NamedTuple):
-    """Whitened items with the same number of loose columns.
-
-    Attributes:
-        owner: index of the component; −1 of the base alone, shape (m,).
-        amplitude: priors of the amplitudes.
-        variance: prior variances of the loose coefficients, shape (m, t).
-        log_weight: log prior probability at each of them, shape (m, t).
-        offset: shape (m, n).
-        slope: shape (m, n).
-        loose: shape (m, j, n).
-        gram: products of the loose columns with each other, shape (m, j, j).
-        with_offset: products of the loose columns with the offset, shape (m, j).
-        with_slope: products of the loose columns with the slope, shape (m, j).
-    """
+    """Items with the same number of loose columns; the base alone has owner −1."""
 
     owner: Int[np.ndarray, " m"]
     amplitude: Amplitudes
@@ -37,9 +24,6 @@ class Block(NamedTuple):
     offset: Float[np.ndarray, "m n"]
     slope: Float[np.ndarray, "m n"]
     loose: Float[np.ndarray, "m j n"]
-    gram: Float[np.ndarray, "m j j"]
-    with_offset: Float[np.ndarray, "m j"]
-    with_slope: Float[np.ndarray, "m j"]
 
 
 class _Curves(NamedTuple):
@@ -55,9 +39,8 @@ class _Curves(NamedTuple):
 class Projection:
     """The base and a context under one model of the noise.
 
-    Attributes:
-        square: square of the whitened readings with the base projected out.
-        constant: part of every log evidence: priors and volume of the whitening.
+    `square` is that of the whitened readings with the base projected out, `constant`
+    the part of every log evidence that priors and the volume of the whitening make.
     """
 
     def __init__(self, problem: LinearProblem, noise: NoiseModel, context: Context):
@@ -81,48 +64,33 @@ class Projection:
         """Return curves, rows last, in which the noise is independent."""
         return self.problem.whiten(curves, self.noise.weight, self.noise.correlation)
 
-    def block(
-        self,
-        owner: Int[np.ndarray, " m"],
-        amplitude: Amplitudes,
-        variance: Float[np.ndarray, "m t"],
-        log_weight: Float[np.ndarray, "m t"],
-        *curves: np.ndarray,
-    ) -> Block:
-        """Return items whitened; `curves` are offset, slope and loose columns [N]."""
-        offset, slope, loose = map(self.whiten, curves)
-        gram = loose @ np.swapaxes(loose, 1, 2)
-        along = ((loose @ each[..., None])[..., 0] for each in (offset, slope))
-        what = owner, amplitude, variance, log_weight
-        return Block(*what, offset, slope, loose, gram, *along)
-
     def evaluate(self, block: Block, only: set[int] | None = None) -> Marginal:
-        """Return the evidence of items, with the weights of their prior.
-
-        If some components only are wanted, the others have no evidence.
-        """
+        """Return the evidence of items with their prior, of some components."""
         rows = slice(None)
         if only is not None:
             rows = np.flatnonzero(np.isin(block.owner, [*only, -1]))
         some = jax.tree.map(lambda column: column[rows], block)
-        curves = self._curves(some.offset, some.slope)
+        offset, slope, loose = map(self.whiten, (some.offset, some.slope, some.loose))
+        curves = self._curves(offset, slope)
         # Through all columns once: of many rows they take longer to read than to use.
-        flat = some.loose.reshape(-1, some.loose.shape[-1])
+        flat = loose.reshape(-1, loose.shape[-1])
         along = flat @ np.column_stack([self._q, self._y])
-        along = along.reshape(*some.loose.shape[:-1], along.shape[1])
+        along = along.reshape(*loose.shape[:-1], along.shape[1])
         inside, along_y = along[..., :-1], along[..., -1]
-        square, rotation = np.linalg.eigh(
-            some.gram - inside @ np.swapaxes(inside, 1, 2)
-        )
+        gram = loose @ np.swapaxes(loose, 1, 2) - inside @ np.swapaxes(inside, 1, 2)
+        square, rotation = np.linalg.eigh(gram)
 
         def of_axes(columns, base):
             left = columns - np.einsum("sjp,sp->sj", inside, base)
             return np.einsum("sj,sjk->sk", left, rotation)
 
+        def with_loose(curves):
+            return (loose @ curves[..., None])[..., 0]
+
         products = Products(
             *curves[:3],
-            of_axes(along_y - some.with_offset, curves.error_q),
-            of_axes(some.with_slope, curves.slope_q),
+            of_axes(along_y - with_loose(offset), curves.error_q),
+            of_axes(with_loose(slope), curves.slope_q),
             np.maximum(square, 0.0),
         )
         found = self._marginal(products, some.variance, some.amplitude)

@@ -117,10 +117,7 @@ def _tables(problem: LinearProblem) -> list[Float[np.ndarray, "k n"]]:
 
 
 def kernels(problem: LinearProblem, effects: Components, owner: int) -> list[Space]:
-    """Return the kernels that the base model leaves and no single effect spans.
-
-    `owner` is the index of the remainder among the components.
-    """
+    """Return the kernels that the base model leaves and no single effect spans."""
     visible = []
     for table in _tables(problem):
         left = problem.project(table)
@@ -168,11 +165,7 @@ def _spanned(problem: LinearProblem, effects: Components, stacked, starts):
 def remainder_space(
     problem: LinearProblem, owner: int, columns, choices: int = 1
 ) -> Space:
-    """Return a space of the remainder, whose size is unknown.
-
-    The columns have an rms of one together, shape (j, n), and are chosen from so many
-    spaces.
-    """
+    """Return a space of unknown size of columns of rms one, among many choices."""
     sd = float(problem.priors["gap_sd"].numbers[-1])
     log_weight = np.full(len(STEPS), -np.log(len(STEPS)) - np.log(choices))
     return Space(owner, columns, sd * STEPS, log_weight)
@@ -230,10 +223,7 @@ def _waves(place: Float[np.ndarray, " n"], most: int) -> Family:
 def likeliest_members(
     problem: LinearProblem, families: list[Family], owner: int
 ) -> list[Space]:
-    """Return the member of each family that the readings show most.
-
-    The base of the problem contains all that is taken as known.
-    """
+    """Return the member of each family that the readings show most."""
     error = problem.project(problem.y)
     half = np.linalg.solve(problem.root.T, problem.X.T).T
     found = []

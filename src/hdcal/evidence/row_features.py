@@ -1,4 +1,4 @@
-"""Features of ordered rows; long records as fewer rows; the step of coarse forces."""
+"""Features of ordered rows; fewer rows of long records; the step of coarse forces."""
 
 from dataclasses import replace
 
@@ -10,9 +10,6 @@ from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.force_model.noise_form import pilot_fit
 
-# Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
-MOST_ROWS = 10_000
-_AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
 # A grid matters from one noise sd on: below, rounding adds less than a tenth to the
 # variance. Rounding to a step scatters by step/√12: much wider than the noise, forces
 # were set and not read.
@@ -79,25 +76,6 @@ def tolerance_functions(records: Records) -> Float[np.ndarray, "j n"]:
     return table / np.sqrt(np.sum(np.mean(table**2, axis=1)))
 
 
-def average_rows(case: Case, most: int = MOST_ROWS) -> Case:
-    """Average neighbouring rows of a half cycle until about `most` rows are left."""
-    group = int(np.ceil(len(case.records.force) / most))
-    if group == 1:
-        return case
-    records = _run_after_run(case)
-    new = _place(half_cycles(records)) % group == 0
-    member = np.cumsum(new) - 1
-    count = np.bincount(member)
-    means = {
-        name: np.bincount(member, np.asarray(getattr(records, name))) / count
-        for name in _AVERAGED
-    }
-    known = np.bincount(member, np.asarray(records.force_sd) ** 2) / count
-    short = take_rows(records, np.flatnonzero(new))
-    short = replace(short, **means, force_sd=np.sqrt(known / count))
-    return replace(case, records=short)
-
-
 def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     """Keep every `step`-th row of each run, the first one among them.
 
@@ -105,23 +83,14 @@ def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     of neighbours are not. The rows that are left are evenly spaced, unless they are
     counted from the turns of the path on, which are then kept.
     """
-    records = _run_after_run(case)
+    order = np.argsort(np.asarray(case.records.run), kind="stable")
+    records = take_rows(case.records, order)
     label = half_cycles(records) if turns else np.asarray(records.run)
     last = np.diff(label, append=label[-1] + 1) != 0
-    kept = np.flatnonzero((_place(label) % step == 0) | (turns & last))
+    rows, begins = np.arange(len(label)), np.diff(label, prepend=label[0] - 1) != 0
+    place = rows - np.maximum.accumulate(np.where(begins, rows, 0))
+    kept = np.flatnonzero((place % step == 0) | (turns & last))
     return replace(case, records=take_rows(records, kept))
-
-
-def _run_after_run(case: Case) -> Records:
-    order = np.argsort(np.asarray(case.records.run), kind="stable")
-    return take_rows(case.records, order)
-
-
-def _place(label: np.ndarray) -> np.ndarray:
-    """Return the number of rows before each one with its label; labels are blocks."""
-    rows = np.arange(len(label))
-    begins = np.diff(label, prepend=label[0] - 1) != 0
-    return rows - np.maximum.accumulate(np.where(begins, rows, 0))
 
 
 def with_coarse_step(case: Case) -> Case:

@@ -11,23 +11,15 @@ from functools import partial
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.evidence import noise_models
 from hdcal.evidence.components import components, lacking
 from hdcal.evidence.evaluation import Evaluated, select
 from hdcal.evidence.items import Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
-from hdcal.evidence.noise_models import (
-    GROWING,
-    OUTLIERS,
-    NoiseModel,
-    correlated_noise,
-    equal_noise,
-    growing_noise,
-    outliers,
-)
+from hdcal.evidence.noise_models import GROWING, OUTLIERS, NoiseModel
 from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
 from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
-    average_rows,
     coarse_step,
     half_cycle_rows,
     thin_rows,
@@ -51,6 +43,8 @@ _MOST_KERNELS, _ONE_MORE = 4, 0.25
 _LEAST_SHARING = 15
 # Changes of stiffness and log noise sd from which on effects are evaluated again.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
+# Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
+_MOST_ROWS = 10_000
 # Of oversampled rows one in three is kept, while so many are left, in all and of a half
 # cycle.
 _STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
@@ -66,7 +60,9 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case = average_rows(with_coarse_step(case))
+    case = with_coarse_step(case)
+    step = -(-len(case.records.force) // _MOST_ROWS)
+    case = thin_rows(case, step) if step > 1 else case
     problem = linear_problem(case, library, free_runs=free_runs)
     found = Searched(problem, library)
     if _oversampled(problem, found.table):
@@ -112,21 +108,12 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
     return {"noise_sd": noise_sd, "stiffness": stiffness}
 
 
-def _likeliest(found: Evaluated, component: int) -> list[Part]:
-    return [found.likeliest(component)]
-
-
 class Searched:
     """All hypotheses of a case; everything alone is entered at once.
 
-    Attributes:
-        problem: the linear problem.
-        table: evidence of each hypothesis.
-        effects: of the library that predict something for the rows, by name.
-        lacking: columns that each of the others needs and that were not measured.
-        components: of the effects.
-        kernels: of the remainder.
-        coarse_step: step of readings on a coarse grid [N]; 0 where there is none.
+    `effects` of the library predict something for the rows; the others lack columns
+    that were not measured. `coarse_step` is that of readings on a coarse grid [N], else
+    0.
     """
 
     coarse_step = 0.0
@@ -145,7 +132,9 @@ class Searched:
         self.kernels = known_kernels or kernels(problem, effects, self.outside)
         sharing = max(len(self.kernels) + len(self.families), _LEAST_SHARING)
         self.log_sharing = float(np.log(sharing))
-        self.table = EvidenceTable((*effects.names, OUTSIDE), equal_noise(problem))
+        self.table = EvidenceTable(
+            (*effects.names, OUTSIDE), noise_models.equal_noise(problem)
+        )
         spaces, names = self._sharing(self.kernels), self.table.names
         self.selection = select(problem, self.table.noises, effects, spaces, names)
         self.found_alone: dict[int, Evaluated] = {}
@@ -183,9 +172,8 @@ class Searched:
             table.put((), column, found.none, list)
             for k, value in enumerate(found.totals()):
                 if np.isfinite(value):
-                    name = (table.names[k],)
-                    parts = partial(_likeliest, found, k)
-                    table.put(name, column, value, parts)
+                    part = partial(found.likeliest, k)
+                    table.put((table.names[k],), column, value, lambda p=part: [p()])
 
     def fitted_correlations(self) -> None:
         """Enter everything alone with the correlations that two hypotheses leave.
@@ -196,7 +184,9 @@ class Searched:
         largest = table.noises[-1].correlation
         for key in dict.fromkeys([(), table.ranked()[0]]):
             fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            more = correlated_noise(problem, problem.y - fit.reading, largest)
+            more = noise_models.correlated_noise(
+                problem, problem.y - fit.reading, largest
+            )
             known = np.array([noise.correlation for noise in table.noises])
             if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
                 table.add_noises([more])
@@ -207,7 +197,11 @@ class Searched:
         table, problem = self.table, self.problem
         likeliest = int(np.argmax(table.noise_probabilities()))
         correlation = table.noises[likeliest].correlation
-        more = growing_noise(problem, correlation) if GROWING in library else []
+        more = (
+            noise_models.growing_noise(problem, correlation)
+            if GROWING in library
+            else []
+        )
         if OUTLIERS in library:
             for key in dict.fromkeys([(), table.ranked()[0]]):
                 parts = table.parts[key]
@@ -216,7 +210,7 @@ class Searched:
                     equal = NoiseModel("", weight, 0.0, 0.0)
                     return posterior(problem, equal, parts).reading
 
-                more += outliers(problem, correlation, fitted)
+                more += noise_models.outliers(problem, correlation, fitted)
         count = len(table.noises)
         table.add_noises(more)
         self._alone(range(count, len(table.noises)))
@@ -269,10 +263,7 @@ class Searched:
     def _extend(
         self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
     ) -> None:
-        """Enter everything, or some components, given some parts.
-
-        These are one component, or a pair whose evidence is in the table.
-        """
+        """Enter everything, or some components, given one or an entered pair."""
         table = self.table
         key = tuple(sorted(table.names[part.component] for part in parts))
         for column, found in self._evaluate(columns, parts, only).items():

@@ -24,11 +24,8 @@ _SINGLE = 1.0 - (_NONE + _REMAINDER + _WITH_REMAINDER + _PAIRS + _PAIRS_WITH)
 class EvidenceTable:
     """Log evidence of hypotheses on the mean reading, by model of the noise.
 
-    Attributes:
-        names: of the components on the mean reading, the remainder last.
-        noises: models of the noise; the evidences contain their priors.
-        log_evidence: of each hypothesis, shape (noises,).
-        parts: the components of each at their most probable items.
+    The remainder is the last name. Evidences contain the priors of the noises; `parts`
+    are the components of each hypothesis at their most probable items.
     """
 
     names: tuple[str, ...]
@@ -77,10 +74,7 @@ class EvidenceTable:
     def put(
         self, names: Names, column: int, value: float, parts: Callable[[], list[Part]]
     ) -> None:
-        """Enter an evidence; of several lower bounds the largest counts.
-
-        `parts` returns the components, where this is the largest evidence so far.
-        """
+        """Enter an evidence, and its components if it is the largest bound so far."""
         key = tuple(sorted(names))
         none = np.full(len(self.noises), -np.inf)
         row = self.log_evidence.setdefault(key, none)

@@ -12,9 +12,8 @@ from hdcal.inference.force_model.priors import without_scatter
 from hdcal.inference.force_model.problem import MEMBERS, case_reading
 from hdcal.inference.force_model.values import Values
 from hdcal.physics.chain import Base
-from hdcal.physics.dynamics import Oscillator, acting, integrate
+from hdcal.physics.dynamics import Forcing, Oscillator, integrate
 from hdcal.physics.effect import parameters
-from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import Scalar
 from hdcal.prediction.joint import JointModel
 from hdcal.prediction.simulate import gear_leftover
@@ -72,7 +71,8 @@ def integrate_all(
     Raises:
         NotUsable: a gear gives way, or a motion could not be integrated.
     """
-    case, (kept, _) = gears.posterior.case, acting(without_scatter(gears.effects))
+    effects, case = without_scatter(gears.effects), gears.posterior.case
+    kept = tuple(effect for effect in effects if effect.instantaneous)
     settings = case_reading(case), temperature, force, times, case.gear.reach
     count, draws = len(mass), (values, mass, damping)
     size = max(min(_CHUNK, _MOST_STATES // len(times)), 1)

@@ -22,8 +22,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.motion.charts import response_chart
 from hdcal.motion.dynamic_problem import mass_prior
 from hdcal.motion.gears_in_motion import integrate_all, moving_draws
-from hdcal.physics.dynamics import acting, damping_ratio, natural_frequency
-from hdcal.physics.forcing import Forcing, SampledForce, Step
+from hdcal.physics.dynamics import Forcing, damping_ratio, natural_frequency
 from hdcal.prediction import conditions
 from hdcal.prediction.joint import JointModel, joint
 from hdcal.prediction.models import Models, averaging_words
@@ -165,9 +164,12 @@ def respond(
                 words = "this calibration of the moving gear determines it"
                 wrong.append(Finding(name, words, "Leave it out"))
     if isinstance(force, str):
-        drive, times = Step(amplitude), np.linspace(0.0, duration or _DURATION, points)
+        drive = Forcing(np.zeros(1), np.full(1, float(amplitude)))
+        times = np.linspace(0.0, duration or _DURATION, points)
+        words = f"a step of {amplitude:g} N"
     else:
-        drive = SampledForce(*(np.asarray(part, float) for part in force))
+        drive = Forcing(*(np.asarray(part, float) for part in force))
+        words = f"a sampled force of {len(drive.time)} rows, linear between them"
         times = np.linspace(drive.time[0], drive.time[-1], points)
     values = moving_draws(joint(models, draws), seed)
     m, c, k = _coefficients(gears, values, at, given, seed)
@@ -178,7 +180,7 @@ def respond(
     # Quantiles are computed of a copy: part by part it takes little memory.
     parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
     band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
-    kept, left = acting(without_scatter(gears.effects))
+    effects = without_scatter(gears.effects)
     motion = pd.DataFrame(
         {
             "time_s": times,
@@ -192,12 +194,14 @@ def respond(
         units=case.units,
         gear=case.gear.name,
         calibration="moving" if dynamic else "at rest",
-        force=drive.words(),
+        force=words,
         temperature_C=at,
         estimates=_estimates(gears, given, m, c, k, peak),
         tested_share=motion.tested.mean(),
-        effects=tuple(effect.name for effect in kept),
-        left_out=tuple(e.name for e in left if e.stage != "noise"),
+        effects=tuple(e.name for e in effects if e.instantaneous),
+        left_out=tuple(
+            e.name for e in effects if not e.instantaneous and e.stage != "noise"
+        ),
         draws=len(m),
         points=points,
         motion=motion,
@@ -258,7 +262,7 @@ def _coefficients(gears: JointModel, values, at: float, given, seed: int):
 def _check_reach(reach: float, drive: Forcing, times, m, k) -> None:
     """Refuse a wrong unit: a force that folds the gear, or a motion of hours."""
     with Findings() as wrong:
-        static = float(drive.largest()) / np.median(k)
+        static = float(drive.largest) / np.median(k)
         if static >= reach:
             words = f"would deform the gear by {static:.3g} mm even at rest"
             wrong.append(Finding("force", words, "Give the force in N"))

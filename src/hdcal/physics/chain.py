@@ -20,12 +20,8 @@ Value = Float[Array, ""] | Float[Array, " n"] | float
 class Base(eqx.Module):
     """The force model without effects; entries may differ from row to row.
 
-    Attributes:
-        stiffness: K·k_theory(E₀) per radial displacement at T_ref [N/mm].
-        alpha: relative loss of Young's modulus per kelvin [1/K].
-        deformation_offset: ω₀, in the deformation as read [mm].
-        force_offset: b, zero of the force reading [N].
-        sigma: noise sd of a reading [N].
+    K·k_theory(E₀) per radial displacement at T_ref [N/mm], α [1/K], ω₀ in the
+    deformation as read [mm], b [N] and the noise sd of a reading [N].
     """
 
     stiffness: Value
@@ -38,9 +34,7 @@ class Base(eqx.Module):
 class Reading(eqx.Module):
     """How the rig reads: fixed by the gear file, never inferred.
 
-    Attributes:
-        radial_per_read: radial displacement per displacement read, 1 or ½ [-].
-        reference_temperature: T_ref [°C].
+    Radial displacement per displacement read, 1 or ½ [-], and T_ref [°C].
     """
 
     radial_per_read: float
@@ -114,7 +108,7 @@ def force(
     deformation_offset: Value = 0.0,
     force_offset: Value = 0.0,
 ) -> Float[Array, "..."]:
-    """Compute F = K k(E₀ (1 − α ΔT)) (ω − ω₀) + b, differentiable in every argument.
+    """Compute F = K k(E₀ (1 − α ΔT)) (ω − ω₀) + b [N], broadcast and differentiable.
 
     Args:
         geometry: sizes [mm].
@@ -126,9 +120,6 @@ def force(
         temperature_rise: ΔT = T − T_ref [K].
         deformation_offset: ω₀ [mm].
         force_offset: b [N].
-
-    Returns:
-        Force [N] in double precision, broadcast over the arguments.
     """
     deformation = jnp.asarray(deformation, dtype=float)
     warm = modulus * (1.0 - alpha * temperature_rise)

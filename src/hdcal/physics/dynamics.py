@@ -9,7 +9,7 @@ effect `hysteresis`: its state is a displacement u. No speed enters, so slow mot
 stick and slip as fast ones do.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +21,6 @@ from jaxtyping import Float
 from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import RING_SERIES, Scalar
 
 # Stiffness of the gear over that of the contact that holds it by friction [-]: a stuck
@@ -40,17 +39,12 @@ _BETWEEN = 16
 def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Scalar:
     """Return the mass that a load moves on a bare ring [N·s²/mm], as read.
 
-    The ring of mass M = 2πRδLρ bends inextensibly as under its two static loads,
-    w = Σ aₙ cos nφ with aₙ = ω/((n²−1)² S), n = 2, 4, …, and v′ = −w. Its kinetic
-    energy (M/4) Σ ȧₙ² (1 + 1/n²) is shared by two loads that each do the work F δω:
-    m = (M/4) Σ (1 + 1/n²)/(n²−1)⁴ / S² = 0.283 M per radial displacement. Read as a
-    diameter between a fixed and a moving platen the centre of the ring moves too: m per
-    displacement read is then m/2 + M/4.
-
-    Args:
-        geometry: sizes [mm].
-        density: ρ [N·s²/mm⁴].
-        radial_per_read: 1 for a radial reading, ½ for a diametral one.
+    The ring of mass M = 2πRδLρ bends inextensibly as under its two static loads, w = Σ
+    aₙ cos nφ with aₙ = ω/((n²−1)² S), n = 2, 4, …, and v′ = −w. Its kinetic energy
+    (M/4) Σ ȧₙ² (1 + 1/n²) is shared by two loads that each do the work F δω: m = (M/4)
+    Σ (1 + 1/n²)/(n²−1)⁴ / S² = 0.283 M per radial displacement. Read as a diameter
+    between a fixed and a moving platen the centre of the ring moves too: m/2 + M/4 per
+    displacement read. The density ρ is in N·s²/mm⁴.
 
     Source: Rayleigh's principle with the static shape of the loaded ring.
     """
@@ -61,6 +55,22 @@ def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Sc
     shape = jnp.sum((1.0 + n**-2) / (n**2 - 1.0) ** 4) / RING_SERIES**2
     radial = 0.25 * whole * shape
     return radial if radial_per_read == 1.0 else radial / 2.0 + whole / 4.0
+
+
+class Forcing(eqx.Module):
+    """A force [N] at increasing times [s]: linear between them, constant beyond."""
+
+    time: Float[Array, " n"]
+    force: Float[Array, " n"]
+
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force [N] at a time [s]."""
+        return jnp.interp(time, self.time, self.force)
+
+    @property
+    def largest(self) -> Float[Array, ""]:
+        """The largest absolute force [N]."""
+        return jnp.max(jnp.abs(self.force))
 
 
 class Oscillator(eqx.Module):
@@ -123,14 +133,6 @@ class Oscillator(eqx.Module):
         return force if self.leftover is None else force + self.leftover(deformation)
 
 
-def acting(
-    effects: Sequence[type[Effect]],
-) -> tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]:
-    """Return the effects that the dynamic model includes, and the others."""
-    kept = tuple(effect for effect in effects if effect.instantaneous)
-    return kept, tuple(effect for effect in effects if not effect.instantaneous)
-
-
 @jax.jit
 def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     """Return √(k/m)/2π of the undamped linear model [Hz]."""
@@ -143,14 +145,11 @@ def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
 
 
 class IntegratedMotion(NamedTuple):
-    """A motion over time.
+    """Deformation [mm] and speed [mm/s] at the times.
 
-    Attributes:
-        deformation: at the times [mm].
-        speed: at the times [mm/s].
-        largest: largest size of the deformation, also between the times [mm].
-        done: whether the integration came to its end within the number of steps.
-        gone: whether it ended at the reach.
+    `largest` is the largest size of the deformation, also between the times [mm].
+    `done`: the integration came to its end within the number of steps; `gone`: at the
+    reach.
     """
 
     deformation: Float[Array, " n"]
@@ -177,7 +176,7 @@ def integrate(
     import diffrax
 
     pace = jnp.sqrt(oscillator.stiffness / oscillator.mass)
-    size = force.largest() / oscillator.stiffness
+    size = force.largest / oscillator.stiffness
     size = jnp.where(size > 0.0, size, 1.0)
     slip, lag = _slip(oscillator, size) / size, 2.0 * jnp.sqrt(STUCK)
 
@@ -190,12 +189,11 @@ def integrate(
         return jnp.stack([v, push / (oscillator.stiffness * size), (held - u) / lag])
 
     relative, absolute = _STICKING if oscillator.frictional else _SMOOTH
-    controller = diffrax.PIDController(rtol=relative, atol=absolute)
-    corners = force.corners()
-    if corners is not None:
-        # A step ends at each corner of the force, so that none is smoothed.
-        inner = (jnp.asarray(corners) - times[0]) * pace
-        controller = diffrax.ClipStepSizeController(controller, step_ts=inner)
+    # A step ends at each corner of the force, so that none is smoothed.
+    controller = diffrax.ClipStepSizeController(
+        diffrax.PIDController(rtol=relative, atol=absolute),
+        step_ts=(jnp.asarray(force.time) - times[0]) * pace,
+    )
     shown = (jnp.asarray(times) - times[0]) * pace
     found = diffrax.diffeqsolve(
         diffrax.ODETerm(motion),

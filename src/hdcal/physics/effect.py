@@ -22,13 +22,9 @@ PerRow = Float[Array, " n"]
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """What a parameter of an effect means.
+    """What a parameter of an effect means: unit, meaning in one line, typical size.
 
-    Attributes:
-        unit: unit in code units.
-        meaning: one line for people.
-        null: the value at which the effect vanishes; None for a shape parameter.
-        typical: a physically ordinary size, used by tests and illustrations.
+    The effect vanishes at `null`, which is None for a shape parameter.
     """
 
     unit: str
@@ -49,12 +45,8 @@ def parameter(
 class Rows(eqx.Module):
     """The input of an effect: the records and the results of earlier stages.
 
-    Attributes:
-        records: the measured rows.
-        temperature_rise: T − T_ref [K].
-        stiffness: K·k(E(T)) per radial displacement [N/mm].
-        deformation: radial deformation of the gear [mm]; on the deformation stage
-            the reading of the rig less its offset.
+    T − T_ref [K], K·k(E(T)) per radial displacement [N/mm], and the radial deformation
+    of the gear [mm]; on the deformation stage the reading of the rig less its offset.
     """
 
     records: Records
@@ -64,12 +56,7 @@ class Rows(eqx.Module):
 
 
 class Noise(eqx.Module):
-    """Reading noise as a mixture of normals, one column per row of the data.
-
-    Attributes:
-        log_weight: log of the mixture weights [-].
-        sd: standard deviation of each component [N].
-    """
+    """Reading noise as a mixture of normals: log weights [-] and sd of each [N]."""
 
     log_weight: Float[Array, " c"]
     sd: Float[Array, "c n"]
@@ -79,20 +66,17 @@ class Effect(eqx.Module, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
     Its name, the key of the registry and prefix of the posterior sites, is that of the
-    class in snake case. The attributes are declared by keywords of the class. A
-    subclass without a stage inherits all of them, and the name, from its base.
+    class in snake case. A subclass without a stage inherits all keywords from its base.
 
     Attributes:
         stage: where in the measurement chain it acts.
         family: kind of mechanism, such as "loop" or "rig".
         needs: features of the records without which it cannot be tested.
-        instantaneous: whether it is a force or play of the gear itself that depends
-            on deformation, speed and temperature of the moment only; `hdcal respond`
-            includes such effects and leaves others out.
+        instantaneous: whether it is a force or play of the gear itself that depends on
+            the moment only; `hdcal respond` leaves other effects out.
         mixture: whether the noise of a reading becomes more than one normal.
-        period: name of the shape parameter that is a period in radial deformation
-            [mm], for an effect with several amplitudes. Records shorter than one
-            period cannot show the effect, unless its prior says so.
+        period: name of the shape parameter that is a period in radial deformation [mm],
+            for an effect with several amplitudes that shorter records cannot show.
     """
 
     name: ClassVar[str]

@@ -55,8 +55,8 @@ def play(
 ) -> Float[Array, "c n"]:
     """Return what follows a deformation with play: it moves only when pushed.
 
-    y ← max(ω − r, min(ω + r, y)) for each half-width r [mm]. Each run, or specimen,
-    starts from y = 0.
+    y ← max(ω − r, min(ω + r, y)) for each half-width r [mm], from 0 in each run or
+    specimen.
     """
     order, starts = by_label(label)
 
@@ -78,8 +78,7 @@ def stop_cells(
 ) -> Float[Array, "c n"]:
     """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
 
-    What a play of this half-width leaves of the deformation. Each run, or specimen,
-    starts from rest: its first row is a move from ω = 0.
+    The rest of a play of this half-width, from rest at ω = 0 in each run or specimen.
     """
     return (deformation - play(deformation, label, reach)) / reach[:, None]
 

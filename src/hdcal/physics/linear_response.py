@@ -38,49 +38,36 @@ def _sine(x):
 
 
 class LinearGear(NamedTuple):
-    """The linear oscillator m ÿ + c ẏ + k y = F.
-
-    Attributes:
-        mass: m [N·s²/mm].
-        damping: c [N·s/mm].
-        stiffness: k, of all steps or of each [N/mm].
-    """
+    """m ÿ + c ẏ + k y = F; k of all steps or of each [N, mm, s]."""
 
     mass: Scalar
     damping: Scalar
     stiffness: Scalar | Float[Array, " n-1"]
 
 
-def decay_entries(
-    gear: LinearGear, step: Float[Array, "*n"]
-) -> tuple[Float[Array, "*n"], ...]:
-    """Return the matrix of the free motion of (y, ẏ) over a time step [s].
-
-    Its four entries, row after row, are exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)),
-    γ = c/2m, x = (k/m − γ²) h², C = cos √x, S = sin √x / √x, valid through
-    critical damping.
-    """
-    half, square = 0.5 * gear.damping / gear.mass, gear.stiffness / gear.mass
-    x = (square - half**2) * step**2
-    decay = jnp.exp(-half * step)
-    level, slope = decay * _cosine(x), decay * _sine(x) * step
-    return level + half * slope, slope, -square * slope, level - half * slope
-
-
-def applied(matrix: tuple[Scalar, ...], state: State) -> State:
+def _applied(matrix: tuple[Scalar, ...], state: State) -> State:
     """Return the product of a matrix, given row after row, and a state."""
     a, b, c, d = matrix
     return a * state[0] + b * state[1], c * state[0] + d * state[1]
 
 
-def whole_steps(gear: LinearGear, time, force) -> tuple[tuple[Scalar, ...], State]:
-    """Return matrix and gain of all steps: state ← matrix · state + gain."""
+def _steps(gear: LinearGear, time, force) -> tuple[tuple[Scalar, ...], State]:
+    """Return matrix and gain of all steps: state ← matrix · state + gain.
+
+    The matrix of the free motion of (y, ẏ), its entries row after row, is
+    exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)), γ = c/2m, x = (k/m − γ²) h², C = cos √x,
+    S = sin √x / √x, valid through critical damping.
+    """
     step = jnp.diff(time)
-    matrix = decay_entries(gear, step)
+    half, square = 0.5 * gear.damping / gear.mass, gear.stiffness / gear.mass
+    x = (square - half**2) * step**2
+    decay = jnp.exp(-half * step)
+    cosine, sine = decay * _cosine(x), decay * _sine(x) * step
+    matrix = cosine + half * sine, sine, -square * sine, cosine - half * sine
     # The state that follows the force F₀ + s t without vibration.
     rate = jnp.diff(force) / step / gear.stiffness
     level = (force[:-1] - gear.damping * rate) / gear.stiffness
-    kept = applied(matrix, (level, rate))
+    kept = _applied(matrix, (level, rate))
     return matrix, (level + rate * step - kept[0], rate - kept[1])
 
 
@@ -100,11 +87,11 @@ def linear_response(
     @jax.checkpoint
     def advance(state, step):
         matrix, gain = step
-        free = applied(matrix, state)
+        free = _applied(matrix, state)
         state = free[0] + gain[0], free[1] + gain[1]
         return state, jnp.stack(state)
 
-    steps = whole_steps(gear, time, force)
+    steps = _steps(gear, time, force)
     _, states = jax.lax.scan(advance, (start[0], start[1]), steps)
     return jnp.concatenate([start[None], states])
 

@@ -74,10 +74,9 @@ def article(geometry: Geometry, modulus: Scalar) -> Scalar:
 
 
 def spring(_geometry: Geometry, modulus: Scalar) -> Scalar:
-    """Return the stiffness that K multiplies where no sizes are known: k = E · 1 mm.
+    """Return the stiffness where no sizes are known: k = E · 1 mm.
 
-    With E fixed at 1 MPa, as a gear file with this theory has it, K is the stiffness
-    itself in N/mm. Sizes may be NaN.
+    With E fixed at 1 MPa K is the stiffness itself in N/mm. Sizes may be NaN.
 
     Source: Hooke's law.
     """
@@ -95,14 +94,13 @@ THEORIES: dict[str, Stiffness] = {
 def peak_stress(geometry: Geometry, modulus: Scalar, deformation: Scalar) -> Scalar:
     """Return the largest hoop bending stress of a ring: σ = E δ ω / (4 S R²) [MPa].
 
-    It acts in the outer surface under the load. The shape is imposed, so that it
-    follows from the radial displacement ω [mm] and not from the force: what stiffens a
-    real gear by K (teeth, closed end) does not change the curvature of its wall. The
-    wall is smooth and free to contract along its axis; held, the stress is larger by
-    1/(1 − ν²). Notches at teeth are not in it.
+    It acts in the outer surface under the load and follows from the radial displacement
+    ω [mm], not from the force: what stiffens a real gear by K does not change the
+    curvature of its wall. The wall is smooth and free to contract along its axis; held,
+    the stress is larger by 1/(1 − ν²). Notches at teeth are not in it.
 
-    Source: Castigliano's ring, moment 0.318 F R under the load (Timoshenko, Strength
-    of Materials).
+    Source: Castigliano's ring, moment 0.318 F R under the load (Timoshenko, Strength of
+    Materials).
     """
     curvature = 0.5 * deformation / RING_SERIES / geometry.radius**2
     return 0.5 * modulus * geometry.wall_thickness * curvature

@@ -68,10 +68,7 @@ class ContactOnset(Effect, stage="force", family="curve up", instantaneous=True)
     """
 
     ratio: Scalar = parameter(
-        "1",
-        "stiffness of the second contact over that of the gear",
-        typical=0.5,
-        null=0.0,
+        "1", "stiffness of the second contact over the gear's", typical=0.5, null=0.0
     )
     onset: Scalar = parameter(
         "mm", "deformation at which the contact closes", typical=0.25

@@ -81,10 +81,7 @@ class Hysteresis(Effect, stage="force", family="loop", needs=("unloading",)):
     """
 
     force: Scalar = parameter(
-        "N",
-        "force when all cells slip, half the width of the loop",
-        typical=4.0,
-        null=0.0,
+        "N", "force when all cells slip, half the loop's width", typical=4.0, null=0.0
     )
     reach: Scalar = parameter(
         "mm", "deformation from rest at which all cells slip", typical=0.1

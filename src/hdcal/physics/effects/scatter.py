@@ -1,7 +1,6 @@
 """Runs and specimens that differ, described by their spread."""
 
-from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, final
+from typing import ClassVar, Literal
 
 import jax.numpy as jnp
 from jax.scipy.special import ndtri
@@ -31,26 +30,8 @@ class Scatter(Effect):
 
     members: ClassVar[Kind]
 
-    if TYPE_CHECKING:
-        sd: Scalar
 
-    def __init_subclass__(cls, *, members: Kind, **declared: Any) -> None:
-        cls.members = members
-        super().__init_subclass__(**declared)
-
-    @abstractmethod
-    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the change of each row by one unit of its member's deviation."""
-
-    @final
-    def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        label = getattr(rows.records, self.members)
-        return signal + self.sd * scores(label) * self.unit(signal, rows)
-
-
-class RunOffset(
-    Scatter, stage="sensor", family="mounting or gear", needs=("runs",), members="run"
-):
+class RunOffset(Scatter, stage="sensor", family="mounting or gear", needs=("runs",)):
     """F → F + b_i in run i, with b_i ~ N(0, sd²).
 
     The zero differs from mounting to mounting.
@@ -58,20 +39,17 @@ class RunOffset(
     Source: Gelman et al., Bayesian Data Analysis (varying-intercept model).
     """
 
+    members = "run"
     sd: Scalar = parameter(
         "N", "spread of the zeros of the runs", typical=2.0, null=0.0
     )
 
-    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        return jnp.ones_like(signal)
+    def apply(self, signal: PerRow, rows: Rows) -> PerRow:
+        return signal + self.sd * scores(rows.records.run)
 
 
 class SpecimenVariation(
-    Scatter,
-    stage="force",
-    family="mounting or gear",
-    needs=("specimens",),
-    members="specimen",
+    Scatter, stage="force", family="mounting or gear", needs=("specimens",)
 ):
     """F → F (1 + d_i) of specimen i, with d_i ~ N(0, sd²).
 
@@ -80,12 +58,10 @@ class SpecimenVariation(
     Source: Gelman et al., Bayesian Data Analysis (varying-slope model).
     """
 
+    members = "specimen"
     sd: Scalar = parameter(
-        "1",
-        "relative spread of the stiffnesses of the specimens",
-        typical=0.05,
-        null=0.0,
+        "1", "relative spread of the specimens' stiffnesses", typical=0.05, null=0.0
     )
 
-    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        return signal
+    def apply(self, signal: PerRow, rows: Rows) -> PerRow:
+        return signal + self.sd * scores(rows.records.specimen) * signal

@@ -73,10 +73,7 @@ class ForceSaturation(Effect, stage="sensor", family="curve down"):
     """
 
     curvature: Scalar = parameter(
-        "1/N^2",
-        "relative loss of reading per square of the force",
-        typical=8e-7,
-        null=0.0,
+        "1/N^2", "relative loss of reading per squared force", typical=8e-7, null=0.0
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:

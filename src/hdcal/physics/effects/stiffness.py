@@ -41,10 +41,7 @@ class LargeDeflection(Effect, stage="force", family="curve down", instantaneous=
     """
 
     curvature: Scalar = parameter(
-        "1/mm",
-        "one over the radius of the gear's neutral line",
-        typical=0.025,
-        null=0.0,
+        "1/mm", "one over the radius of the neutral line", typical=0.025, null=0.0
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
@@ -89,10 +86,7 @@ class StiffnessFatigue(
     """
 
     loss: Scalar = parameter(
-        "1",
-        "relative loss of stiffness per decade of load cycles",
-        typical=0.015,
-        null=0.0,
+        "1", "relative loss per decade of load cycles", typical=0.015, null=0.0
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
