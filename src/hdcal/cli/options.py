@@ -10,7 +10,6 @@ from click.core import ParameterSource
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
     read_all,
-    read_columns,
     read_named,
     read_quantity,
 )
@@ -52,7 +51,12 @@ column_option = repeated_option(
     "--column",
     "columns",
     metavar="QUANTITY=HEADER",
-    read=read_columns,
+    read=partial(
+        read_named,
+        read=lambda header, _: header,
+        fault="names no header",
+        example="force=Load[kgf]",
+    ),
     help="Read a quantity from a column: force=Load[kgf]. May be repeated.",
 )
 # How cases are read.

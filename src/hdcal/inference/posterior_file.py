@@ -3,14 +3,13 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
 
 from hdcal.data.regular_file import why_not_readable
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, InputError
 
 FILE_NAME = "posterior.nc"
 # Attributes that hold the format, and the digest of everything else.
@@ -64,14 +63,14 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
 
     Raises:
         InputError: it is missing, damaged, changed, or of another kind or version.
-        NotUsable: it belongs to a diagnosis that failed.
     """
     if (why := why_not_readable(path, _LARGEST_FILE)) is not None:
         raise InputError([Finding(str(path), *why)])
     try:
         tree = xr.load_datatree(path, engine="h5netcdf")
     except FileNotFoundError as error:
-        raise _missing(path) from error
+        remedy = "Name the folder of a calibration that did not fail"
+        raise InputError([Finding(str(path), "does not exist", remedy)]) from error
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
@@ -100,8 +99,8 @@ def digest(tree: xr.DataTree) -> str:
         whole.update(json.dumps([node.path, attributes], sort_keys=True).encode())
         variables = node.to_dataset(inherit=False).variables
         for name in sorted(map(str, variables)):
-            one, values = variables[name], variables[name].values
-            whole.update(json.dumps([name, one.dims, one.shape]).encode())
+            variable, values = variables[name], variables[name].values
+            whole.update(json.dumps([name, variable.dims, variable.shape]).encode())
             is_numeric = values.dtype.kind in "biuf"
             texts = b"" if is_numeric else json.dumps(values.tolist()).encode()
             whole.update(values.tobytes() if is_numeric else texts)
@@ -119,15 +118,3 @@ def _kind(written: object) -> Kind | None:
     name = str(written).rpartition("/")[0]
     kinds = CALIBRATION, FLEET
     return next((kind for kind in kinds if kind.format.startswith(f"{name}/")), None)
-
-
-def _missing(path: Path) -> InputError | NotUsable:
-    """Return the error for a file that is not there, as of a failed diagnosis."""
-    verdict = {}
-    with suppress(OSError, ValueError):
-        verdict = json.loads((path.parent / "verdict.json").read_bytes())
-    if verdict.get("status") == "failed":
-        reasons = "; ".join(map(str, verdict.get("reasons", ())))
-        return NotUsable(f"this diagnosis failed and must not be used: {reasons}")
-    remedy = "Name the folder of a calibration"
-    return InputError([Finding(str(path), "there is no such file", remedy)])

@@ -23,19 +23,15 @@ MARKER = "hdcal-result.json"
 class Target:
     """Output folder or file, locked by this process until the context exits.
 
-    Attributes:
-        name: as given by the user; symbolic links are resolved.
-        force: whether an older result may be replaced.
-        option: the parameter that sets `force`.
-        beginning: first bytes of a file that may be replaced; None for a folder.
-
     Raises:
         InputError: the target exists, is in use or cannot be written.
     """
 
     name: str
+    # Whether an older result may be replaced, and the parameter that allows it.
     force: bool = False
     option: str = "force"
+    # First bytes of a file that may be replaced; None for a folder.
     beginning: bytes | None = None
 
     def __post_init__(self) -> None:
@@ -135,10 +131,10 @@ class Target:
 
 def _contents(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file, or "link" or "folder", by relative path."""
-    found = {}
+    contents = {}
     for path in sorted(folder.rglob("*")):
         content = "link" if path.is_symlink() else "folder"
         if path.is_file() and content != "link":
             content = hashlib.sha256(path.read_bytes()).hexdigest()
-        found[path.relative_to(folder).as_posix()] = content
-    return found
+        contents[path.relative_to(folder).as_posix()] = content
+    return contents
