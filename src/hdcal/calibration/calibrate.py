@@ -44,11 +44,7 @@ _PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to 
 def choose_effects(
     names: Sequence[str], registry: Mapping[str, type[Effect]] = EFFECTS
 ) -> tuple[type[Effect], ...]:
-    """Look effects up by name in a library; each counts once.
-
-    Raises:
-        InputError: a name is not in the library; the nearest one is suggested.
-    """
+    """Look effects up by name in a library; `InputError` if it lacks one."""
     if isinstance(names, str):
         remedy = f"Give a list of names, as ['{names}']"
         raise InputError([Finding("effects", f"'{names}' is one text", remedy)])

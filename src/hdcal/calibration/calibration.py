@@ -137,11 +137,7 @@ def calibration_of(posterior: Posterior) -> Calibration:
 
 
 def summarise(posterior: Posterior) -> dict:
-    """Return a calibration as plain data: the content of summary.json.
-
-    Raises:
-        InputError: `posterior` is not a calibration.
-    """
+    """Return a calibration as plain data: the content of summary.json."""
     if not isinstance(posterior, Posterior):
         words = f"a {type(posterior).__name__} is not a calibration"
         remedy = "Its numbers are in .to_frame() and .to_datatree()"

@@ -20,11 +20,7 @@ def completed_on_cluster(
     """Yield the result of `work` for every task, in the order of completion.
 
     `work` can be imported by name on the workers; `tasks`, its arguments, are taken as
-    workers become free; `lost` is the remedy if the cluster is lost.
-
-    Raises:
-        InputError: Dask is not installed, or there is no scheduler or no worker.
-        HdcalError: the cluster was lost, or a task has killed several workers.
+    workers become free; `lost` is the remedy if the cluster is lost (`HdcalError`).
     """
     with _client(address) as client:
         from distributed import KilledWorker, as_completed

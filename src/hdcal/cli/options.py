@@ -72,9 +72,7 @@ reading_options = combined(
         help="Decode the data file with this encoding [default: detected].",
     ),
     click.option(
-        "--specimen",
-        metavar="LABEL",
-        help="Read the rows of this specimen only.",
+        "--specimen", metavar="LABEL", help="Read the rows of this specimen only."
     ),
     sheet_option,
     column_option,

@@ -66,11 +66,7 @@ def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
 
 
 def pareto_shape(weight: np.ndarray) -> float:
-    """Return the Pareto k of importance weights (n,); infinite if few are above zero.
-
-    Raises:
-        ValueError: the largest weights are equal.
-    """
+    """Return the Pareto k of importance weights (n,); infinite if few are positive."""
     from arviz_stats.base.array import array_stats
 
     # The tail that is fitted would hold weights of zero.

@@ -2,12 +2,8 @@
 
 Three multivariate t distributions propose, of one centre and increasing width. In
 rounds they take mean and covariance of the weighted proposals; then proposals are
-resampled. Where they cover the posterior badly nothing is returned.
-
-Source:
-    Cappé, Guillin, Marin and Robert, Journal of Computational and Graphical Statistics
-    13 (2004), population Monte Carlo; Vehtari et al., Journal of Machine Learning
-    Research 25 (2024), Pareto k.
+resampled (Cappé et al., Journal of Computational and Graphical Statistics 13, 2004;
+Pareto k: Vehtari et al., Journal of Machine Learning Research 25, 2024).
 """
 
 from typing import Any, NamedTuple

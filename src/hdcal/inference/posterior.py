@@ -141,11 +141,8 @@ class Posterior(Shown):
     def load(cls, path: Path | str, effects: Library | None = None) -> Self:
         """Read the posterior of one model from a result folder or its posterior.nc.
 
-        Effects from outside need their library.
-
-        Raises:
-            InputError: the file is missing, damaged, changed, of several models or
-                from another version, or names an effect that the library lacks.
+        `InputError` if the file is missing, damaged, changed, of several models or from
+        another version, or names an effect that the library of effects lacks.
         """
         file = file_of(path)
         return cls.from_tree(read_tree(file), file, effects)

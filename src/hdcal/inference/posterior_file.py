@@ -59,30 +59,25 @@ def content(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, str]) -> byt
 
 
 def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
-    """Return the content of a posterior file.
-
-    Raises:
-        InputError: it is missing, damaged, changed, or of another kind or version.
-    """
+    """Return the content of a posterior file; `InputError` if it cannot be used."""
     if (why := why_not_readable(path, _LARGEST_FILE)) is not None:
         raise InputError([Finding(str(path), *why)])
     try:
         tree = xr.load_datatree(path, engine="h5netcdf")
     except FileNotFoundError as error:
         remedy = "Name the folder of a calibration that did not fail"
-        raise InputError([Finding(str(path), "does not exist", remedy)]) from error
+        raise InputError(
+            [Finding(str(path), "there is no such file", remedy)]
+        ) from error
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
     format_name = tree.attrs.get(FORMAT)
     if (written := _kind(format_name)) is None:
         raise not_a_posterior(path, kind)
-    if written is not kind:
-        problem = f"is {written.words}, and one {kind.words} is needed"
-        remedy = f"Name the result folder {kind.words}"
-    elif format_name != kind.format:
-        problem = f"has the format {format_name}, and this hdcal reads {kind.format}"
-        remedy = f"Use the hdcal that wrote it, or {kind.again}"
+    if format_name != kind.format:
+        problem = f"is {written.words} ({format_name}), and {kind.format} is needed"
+        remedy = f"Name the result folder {kind.words}, or {kind.again}"
     elif tree.attrs.get(DIGEST) != digest(tree):
         problem = "was changed after hdcal wrote it"
         remedy = f"Take the file as it was written, or {kind.again}"

@@ -95,11 +95,7 @@ def sample(
 
 
 def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
-    """Check that a run is long enough for its checks, and not endless.
-
-    Raises:
-        InputError: it is not.
-    """
+    """Raise `InputError` if a run is too short for its checks, or endless."""
     settings = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
     with Findings() as wrong:
         for name, value in settings.items():

@@ -146,11 +146,7 @@ class Result(Item):
         return {name: replace(chart, failed=failed) for name, chart in made}
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the first panel of the first chart, by default on axes of pyplot.
-
-        Raises:
-            NotImplementedError: the result has no chart.
-        """
+        """Draw the first panel of the first chart, by default on axes of pyplot."""
         from hdcal.report.charts.chart_drawing import draw_panel
 
         for chart in self.charts().values():

@@ -21,10 +21,9 @@ MARKER = "hdcal-result.json"
 
 @dataclass
 class Target:
-    """Output folder or file, locked by this process until the context exits.
+    """Output folder or file, locked until the context exits.
 
-    Raises:
-        InputError: the target exists, is in use or cannot be written.
+    `InputError` if it exists, is in use or cannot be written.
     """
 
     name: str
@@ -74,9 +73,7 @@ class Target:
     def filled(self) -> Iterator[Path]:
         """Path of an empty folder, or of a new file, that is renamed at the end.
 
-        Raises:
-            InputError: the target was created or edited; the new result is beside it.
-            NotWritable: writing failed.
+        Beside the target, if that was created or edited: `InputError`.
         """
         try:
             if self.beginning is None:

@@ -25,10 +25,9 @@ _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 def rendered(
     template: str, block: str, values: Mapping[str, Any], *, plain: bool = False
 ) -> str:
-    """Return a block of a template, given by its path inside the package.
+    """Return a block of a template, given by its path in the package; empty if none.
 
-    The text is empty if there is no such block, and plain without the escapes of
-    Markdown. Texts of the variables may come from files.
+    A plain text has no escapes of Markdown. Texts of variables may come from files.
     """
     page = _environment(plain).get_template(template)
     context = page.new_context(dict(values))
@@ -54,18 +53,19 @@ def _environment(plain: bool) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
-        "capital": capital,
-        "code": code,
-        "hypothesis": hypothesis,
-        "label": label,
-        "median": median,
-        "load": load,
-        "number": number,
-        "percent": percent,
-        "span": span,
-        "unit": unit,
-    }
+    filters = (
+        capital,
+        code,
+        hypothesis,
+        label,
+        load,
+        median,
+        number,
+        percent,
+        span,
+        unit,
+    )
+    environment.filters |= {function.__name__: function for function in filters}
     return environment
 
 

@@ -90,11 +90,7 @@ def init(console: Console, folder, data, columns, sheet, **stated):
 
 
 def _write(folder: Path, files: dict[str, bytes]) -> None:
-    """Write files into a folder that may be there already; none of theirs is replaced.
-
-    Raises:
-        InputError: one of them is there already, or cannot be written.
-    """
+    """Write new files into a folder that may be there already."""
     if there := [name for name in files if (folder / name).exists()]:
         words = f"holds {' and '.join(there)} already"
         raise InputError([Finding(str(folder), words, "Name another folder")])

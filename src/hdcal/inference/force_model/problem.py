@@ -132,9 +132,7 @@ def build_problem(
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
     Theory and structure are by default the gear's and that which the readings show.
-
-    Raises:
-        InputError: an effect lacks its covariates or a prior.
+    `InputError` if an effect lacks its covariates or a prior.
     """
     records, reading = case.records, case_reading(case)
     members = {

@@ -177,9 +177,8 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
             entries.setdefault(mark.label, []).extend(handles)
     x, y = ("y", "x") if panel.horizontal else ("x", "y")
     axes.set(**{f"{x}label": _plain(panel.x), f"{y}label": _plain(panel.y)})
-    for axis, log in ((x, panel.x_log), (y, panel.y_log)):
-        if log:
-            axes.set(**{f"{axis}scale": "log"})
+    if panel.x_log:
+        axes.set(**{f"{x}scale": "log"})
     if panel.y_limits != (None, None):
         axes.set(**{f"{y}lim": panel.y_limits})
     if panel.names:

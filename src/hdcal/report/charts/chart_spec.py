@@ -109,7 +109,6 @@ class Panel:
     horizontal: bool = False
     y_limits: tuple[float | None, float | None] = (None, None)
     x_log: bool = False
-    y_log: bool = False
     y_ticks: bool = True
     wide: bool = False
     height: float = 0.0
