@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import jsonschema
 import pytest
 from commands import ROOT, XB1, Done, Hdcal
 from schema_checks import obeys
@@ -51,24 +50,6 @@ def test_the_summary_obeys_its_schema_and_is_what_json_prints(calibrated: Calibr
     assert "influence coefficient K" in done.stderr
     assert summary["headline"] in " ".join(done.stderr.split())
     assert 195 < summary["stiffness_N_per_mm"]["median"] < 220
-
-
-@pytest.mark.parametrize(
-    ("place", "wrong"),
-    [
-        ("parameters.K.driven_by", "hope"),
-        ("parameters.K.contraction", 1.5),
-        ("K_by_theory", {}),
-    ],
-)
-def test_the_schema_refuses_wrong_values(calibrated: Calibrated, place: str, wrong):
-    summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
-    inner, (*keys, last) = summary, place.split(".")
-    for key in keys:
-        inner = inner[key]
-    inner[last] = wrong
-    with pytest.raises(jsonschema.ValidationError):
-        obeys(summary, Calibration)
 
 
 def test_the_bands_are_ordered_and_marked(calibrated: Calibrated):

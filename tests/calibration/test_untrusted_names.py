@@ -46,9 +46,3 @@ def test_names_are_only_text(name: str, posterior: Posterior):
     cell = found._repr_html_()
     assert "<script" not in cell and "<img src=x" not in cell
     assert not set(found.text()) & {"\x00", "\x1b", "\x07", "\u202e"}
-
-
-def test_data_and_sources_of_priors_are_in_the_page(posterior: Posterior):
-    page = calibration_of(posterior).page()
-    assert posterior.case.data_sha256 in page and posterior.case.gear.name in page
-    assert all(name in page for name in ("Young", "loss of modulus"))

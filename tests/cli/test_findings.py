@@ -1,11 +1,9 @@
 """A finding about a parameter of the library is printed as one about the option."""
 
-import click
 import pytest
 from commands import XB1, Hdcal
 from moving import still_posterior
 
-from hdcal.cli.command import command
 from hdcal.data.measurements.measurements import read_measurements
 from hdcal.errors import Finding, InputError
 
@@ -40,28 +38,6 @@ def test_every_wrong_number_is_reported_at_once(here: Hdcal):
     assert done.returncode == 2
     for name in (*asked[::2], "no-case"):
         assert f"hdcal: {name}" in done.stderr, name
-
-
-def test_findings_of_a_command_use_its_option_names():
-    @command()
-    @click.argument("known", metavar="[RUN]", required=False)
-    @click.option("--column", "columns", multiple=True)
-    def asked(known, columns):
-        words = "`columns` force=… is wrong, see `hdcal check`"
-        raise InputError(
-            [
-                Finding("columns", words, "Mend it"),
-                Finding("known", words, "Mend it"),
-                Finding("known", words, "Mend it", row=3),
-            ]
-        )
-
-    with pytest.raises(InputError) as caught:
-        asked.main([], standalone_mode=False)
-    names = [finding.file for finding in caught.value.findings]
-    assert names == ["--column", "RUN", "known"]
-    problem = caught.value.findings[0].problem
-    assert problem == "--column force=… is wrong, see `hdcal check`"
 
 
 def test_long_input_is_shortened_in_messages(here: Hdcal, tmp_path):

@@ -49,28 +49,6 @@ def test_a_table_of_another_program_is_kept(here: Hdcal, calibrated, tmp_path: P
     assert {*os.listdir(tmp_path)} == {"readings.csv", "bands.csv"}
 
 
-def test_a_folder_that_appears_during_the_work_is_kept(
-    here: Hdcal, monkeypatch, tmp_path: Path
-):
-    from hdcal.classical import fit
-
-    original = fit.fit
-
-    def slow(*given, **named):
-        (tmp_path / "made").mkdir()
-        (tmp_path / "made" / "thesis.txt").write_text("years of work")
-        return original(*given, **named)
-
-    monkeypatch.setattr(fit, "fit", slow)
-    done = here("fit", XB1, "--out", "made", "--force", "--json")
-    assert done.returncode == 2
-    (finding,) = json.loads(done.stdout)["findings"]
-    assert finding["file"] == "made" and "'made-2'" in finding["problem"]
-    assert {path.name for path in tmp_path.iterdir()} == {"made", "made-2"}
-    assert [path.name for path in (tmp_path / "made").iterdir()] == ["thesis.txt"]
-    assert (tmp_path / "made-2" / "fit.json").exists()
-
-
 def test_a_full_disk_keeps_the_older_result(here: Hdcal, tmp_path: Path):
     asked = ["fit", str(XB1), "--out", "run"]
     assert here(*asked).returncode == 0

@@ -1,6 +1,5 @@
 """In whatever coordinates: the sampled density is that of priors and likelihood."""
 
-import jax
 import numpy as np
 import pytest
 from gauged import certified
@@ -12,7 +11,6 @@ from structures import form_of
 from hdcal import EFFECTS
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior, effect_priors
-from hdcal.inference.force_model import model
 from hdcal.inference.force_model.problem import build_problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
 
@@ -83,17 +81,3 @@ def off(kind: str) -> np.ndarray:
 def test_the_density_is_that_of_the_stated_priors(kind: str):
     # Far from the data the densities themselves reach 1e6.
     np.testing.assert_allclose(off(kind), 0.0, atol=1e-4)
-
-
-@pytest.mark.thorough
-def test_a_coordinate_that_forgets_its_scale_is_noticed(monkeypatch):
-    honest = model._scaled_and_moved
-    monkeypatch.setattr(
-        model,
-        "_scaled_and_moved",
-        lambda name, prior, scale, by: honest(name, prior, 1.1 * scale, by),
-    )
-    jax.clear_caches()
-    found = off("correlated")
-    jax.clear_caches()
-    assert np.abs(found).max() > 0.1

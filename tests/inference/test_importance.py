@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from hdcal.data.prior import Prior
-from hdcal.inference import importance, laplace
+from hdcal.inference import laplace
 from hdcal.inference.importance import sample_by_importance
 from hdcal.inference.sampled_problem import Sampled
 
@@ -59,16 +59,6 @@ def test_draws_have_a_skewed_distribution_and_follow_the_seed():
     size, place = (found.values[name][:, ::4].ravel() for name in ("size", "place"))
     assert stats.kstest(size, stats.gamma(5.0).cdf).pvalue > 0.001
     assert stats.kstest(place - 2.0 * size, stats.norm.cdf).pvalue > 0.001
-
-
-def test_wrong_weights_would_be_noticed(monkeypatch):
-    def equal(problem, whitening, proposals, place, progress=None):
-        noise = 1e-3 * np.random.default_rng(0).random(len(place))
-        return (1.0 + noise) / np.sum(1.0 + noise)
-
-    monkeypatch.setattr(importance, "_weights", equal)
-    size = first_drawn(Skew({}), draws=2000).values["size"].ravel()
-    assert stats.kstest(size, stats.gamma(5.0).cdf).pvalue < 1e-6
 
 
 def test_what_proposals_do_not_cover_is_not_drawn():

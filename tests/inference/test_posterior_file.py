@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from posteriors import batch, beside, single, with_leftover
 
-from hdcal.errors import InputError, NotUsable
+from hdcal.errors import InputError
 from hdcal.inference.force_model import problem as problem_module
 from hdcal.inference.model_average import LeftOut, ModelAverage, load_models
 from hdcal.inference.posterior import HYPOTHESIS, Posterior
@@ -99,11 +99,6 @@ def test_a_foreign_file_and_a_missing_one_are_refused(tmp_path: Path):
     xr.Dataset({"K": ("draw", np.ones(3))}).to_netcdf(file, engine="h5netcdf")
     with pytest.raises(InputError, match="not a posterior"):
         Posterior.load(file)
-    file.unlink()
-    answer = '{"schema": "hdcal.verdict/2", "status": "failed", "reasons": ["R-hat"]}'
-    (tmp_path / "verdict.json").write_text(answer)
-    with pytest.raises(NotUsable, match="R-hat"):
-        Posterior.load(tmp_path)
 
 
 def test_an_effect_that_the_library_lacks_is_refused(file: Path):

@@ -1,6 +1,5 @@
 """Every public result shows what matters most of it in a notebook's cell."""
 
-import numpy as np
 import pytest
 import xarray as xr
 from diagnosis_cases import judged, rich, simulated
@@ -55,25 +54,6 @@ def test_a_result_is_a_cell_a_line_a_table_and_a_drawing(name: str, results):
         # Draws of these; their table is a frame alone.
         if name not in {"Fleet", "Posterior"}:
             assert set(frame.columns) == set(tree.to_dataset().data_vars)
-
-
-def test_tables_hold_what_the_results_say(results):
-    margin, verdict = results["Margin"][0], results["Diagnosis"][0]
-    (level,) = margin.to_frame().itertuples()
-    assert level.upper_bound_N == margin.worst.upper_bound_N
-    assert level.force_N == margin.worst.force_N.median
-    probabilities = [cause.probability for cause in verdict.effects]
-    assert [*verdict.to_frame().probability] == probabilities
-    bands, posterior = results["Bands"][0], results["Posterior"][0]
-    np.testing.assert_array_equal(bands.to_frame().tested, bands.tested)
-    parameters = posterior.to_frame().set_index("name")
-    for name in ("K", "stiffness"):
-        low, middle, high = parameters.loc[name, ["lo", "median", "hi"]]
-        assert low < middle < high
-    assert posterior.to_datatree() is posterior.tree
-    fleet = results["Fleet"][0]
-    drawn = fleet.to_datatree()["posterior"]["stiffness"]
-    np.testing.assert_array_equal(drawn.values.ravel(), fleet.draws["stiffness"])
 
 
 def test_pyplot_is_asked_where_no_axes_are_given(results):

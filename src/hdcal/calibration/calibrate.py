@@ -15,7 +15,7 @@ from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.checks import Check, correlation_check, rounding_check
+from hdcal.inference.checks import correlation_check, rounding_check
 from hdcal.inference.force_model.assembly import (
     assemble,
     force_log_likelihood,
@@ -44,11 +44,7 @@ _PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to 
 def choose_effects(
     names: Sequence[str], registry: Mapping[str, type[Effect]] = EFFECTS
 ) -> tuple[type[Effect], ...]:
-    """Look effects up by name in a library; each counts once.
-
-    Raises:
-        InputError: a name is not in the library; the nearest one is suggested.
-    """
+    """Look effects up by name in a library; `InputError` if it lacks one."""
     if isinstance(names, str):
         remedy = f"Give a list of names, as ['{names}']"
         raise InputError([Finding("effects", f"'{names}' is one text", remedy)])
@@ -72,21 +68,14 @@ def calibrate(
 ) -> Posterior:
     """Calibrate the force model against a case; the same seed gives the same draws.
 
-    The posterior may have failed its checks, see `Posterior.usable`.
+    The posterior may have failed its checks, see `Posterior.usable`. Warm-up and draws
+    are those of each chain.
 
-    Args:
-        case: from `read_case`.
-        effects: names of effects to include.
-        theory: overrides the gear's.
-        with_gap: whether the model has a leftover discrepancy, orthogonal to the base
-            model; by default where the readings show a bend, and never with effects.
-        adapt_noise: let the noise grow with the force where it clearly does.
-        chains: independent chains, two or more so that they can be compared.
-        warmup: iterations of adaptation per chain.
-        draws: draws kept per chain.
-        seed: of `jax.random.key`.
-        registry: the library in which names are looked up.
-        progress: called with (iterations done, iterations in all).
+    The effects are names of the registry; the theory is by default the gear's. The
+    model has a leftover discrepancy, orthogonal to the base model, by `with_gap`, by
+    default where the readings show a bend and never with effects. With `adapt_noise`
+    the noise grows with the force where it clearly does. `progress` is called with the
+    numbers of iterations done and in all.
 
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates; or
@@ -95,13 +84,13 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    asked = choose_effects(effects, registry)
+    requested = choose_effects(effects, registry)
     check_effect_priors(case, registry)
-    chosen, shipped = asked, effect_priors(case.gear.full_scale)
-    if adapt_noise and _may_grow(case, asked) and noise_grows(case):
-        chosen, shipped = (*asked, HeteroscedasticNoise), shipped | _SHOWN
+    chosen, shipped = requested, effect_priors(case.gear.full_scale)
+    if adapt_noise and _may_grow(case, requested) and noise_grows(case):
+        chosen, shipped = (*requested, HeteroscedasticNoise), shipped | _SHOWN
         case = _with_constant_part(case)
-    form = decide_structure(case, asked, with_gap)
+    form = decide_structure(case, requested, with_gap)
     theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, structure=form)
@@ -118,12 +107,13 @@ def calibrate(
         rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
         correlation_check(found.values, len(records.force), form.why_independent),
     ]
-    if not asked and with_gap is None:
+    if not requested and with_gap is None:
         # An effect, or a requested bend, is a reason for another stiffness.
         checks += [
             line_check(records, stiffness, sized=theory != SPRING),
             straight_check(case, stiffness),
         ]
+    say = case.units.say
     parts = assemble(
         case,
         priors,
@@ -133,7 +123,7 @@ def calibrate(
         log_likelihood=force_log_likelihood(case, problem, found),
         sensitivities=linearise(problem, found.median, records).sensitivities(),
         mixed=_other_quantities(problem, found),
-        checks=_in_units(case, checks),
+        checks=[replace(c, name=say(c.name), words=say(c.words)) for c in checks],
     )
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
     settings |= {STRUCTURE: asdict(form)} | run_settings(found, began)
@@ -161,17 +151,11 @@ def _with_constant_part(case: Case) -> Case:
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
-def _in_units(case: Case, checks: Sequence[Check]) -> list[Check]:
-    """Return checks whose words name what was measured."""
-    say = case.units.say
-    return [replace(one, name=say(one.name), words=say(one.words)) for one in checks]
-
-
 def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     """Return what else must have mixed: the headline, and members that were sampled."""
     others = {"stiffness": found.values["stiffness"]}
     for kind, name in MEMBERS.items():
         if name in found.values and kind not in problem.integrated:
-            each = np.moveaxis(found.values[name], -1, 0)
-            others |= {f"{name}[{index}]": draws for index, draws in enumerate(each)}
+            members = np.moveaxis(found.values[name], -1, 0)
+            others |= {f"{name}[{i}]": draws for i, draws in enumerate(members)}
     return others

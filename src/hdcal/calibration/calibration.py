@@ -32,14 +32,7 @@ _WANTED = ("unloading", "specimen", "temperature")
 
 
 class ResidualShape(Item):
-    """A shape of the residuals that noise would rarely have.
-
-    Attributes:
-        name: what they depend on.
-        p_value: adjusted for the number of shapes tried.
-        size_N: root mean square of the shape.
-        words: one sentence.
-    """
+    """A shape of the residuals that noise would rarely have, and its rms."""
 
     name: str
     p_value: Annotated[float, Field(ge=0.0, le=1.0)]
@@ -50,15 +43,8 @@ class ResidualShape(Item):
 class Calibration(PosteriorResult):
     """What `hdcal calibrate` answers; summary.json.
 
-    Attributes:
-        parameters: by name, those that were fixed last.
-        K_by_theory: from the one posterior by every theory; None of a spring.
-        residuals: their shapes that noise would rarely have, those of the noise last.
-        effects: in the model.
-        with_gap: whether the model has a leftover discrepancy.
-        specimens: of several, by label, the stiffness of each as read [N/mm].
-        steps: names of what to do next, most urgent first.
-        left: residuals by row.
+    Residuals are their shapes, those of the noise last. Of several specimens each has
+    its stiffness. Steps are names of what to do next, most urgent first.
     """
 
     template = "calibration/report.md.j2"
@@ -80,11 +66,11 @@ class Calibration(PosteriorResult):
     @property
     def part_of_curve(self) -> str:
         """Working range over which a curve that is no line has its stiffness."""
-        found = self.posterior.case.screening
-        part = None if found is None else found.straight
-        if found is None or part is None or part.whole or self.acting:
+        screening = self.posterior.case.screening
+        part = None if screening is None else screening.straight
+        if screening is None or part is None or part.whole or self.acting:
             return ""
-        return found.working_range
+        return screening.working_range
 
     @property
     def known(self) -> frozenset[str]:
@@ -151,11 +137,7 @@ def calibration_of(posterior: Posterior) -> Calibration:
 
 
 def summarise(posterior: Posterior) -> dict:
-    """Return a calibration as plain data: the content of summary.json.
-
-    Raises:
-        InputError: `posterior` is not a calibration.
-    """
+    """Return a calibration as plain data: the content of summary.json."""
     if not isinstance(posterior, Posterior):
         words = f"a {type(posterior).__name__} is not a calibration"
         remedy = "Its numbers are in .to_frame() and .to_datatree()"
@@ -173,7 +155,7 @@ def K_by_theory(posterior: Posterior) -> dict[str, Interval | None]:
     geometry, K = posterior.case.gear.geometry, posterior.draws["K"]
     unit = {name: float(THEORIES[name](geometry, 1.0)) for name in _SIZED}
     used = unit[posterior.theory]
-    return {name: Interval.of(K * (used / each)) for name, each in unit.items()}
+    return {name: Interval.of(K * (used / other)) for name, other in unit.items()}
 
 
 def _specimens(posterior: Posterior) -> dict[str, Interval]:
@@ -181,9 +163,9 @@ def _specimens(posterior: Posterior) -> dict[str, Interval]:
     deviation = posterior.draws.get("specimen_deviation")
     if deviation is None:
         return {}
-    each = posterior.draws["stiffness"][:, None] * (1.0 + deviation)
+    stiffness = posterior.draws["stiffness"][:, None] * (1.0 + deviation)
     labels = posterior.case.specimen_labels
-    return dict(zip(labels, map(Interval.of, each.T), strict=True))
+    return dict(zip(labels, map(Interval.of, stiffness.T), strict=True))
 
 
 def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:

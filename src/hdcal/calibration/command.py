@@ -1,7 +1,5 @@
 """`hdcal calibrate`: from measurements to a result folder."""
 
-from typing import TYPE_CHECKING, Any
-
 import click
 
 from hdcal.cli.command import command
@@ -15,9 +13,6 @@ from hdcal.cli.options import (
     take_reading,
 )
 from hdcal.errors import Finding
-
-if TYPE_CHECKING:
-    from hdcal.data.case import Case
 
 
 @command(short_help="Calibrate the force model against measurements.")
@@ -81,36 +76,20 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     for note in case.notes:
         console.words(note)
     if dynamic:
-        return _dynamic(console, case, settings)
-    from hdcal.calibration.calibrate import calibrate as sample
-    from hdcal.calibration.calibration import calibration_of
+        from hdcal.motion.dynamic_calibration import calibrate_dynamic as sample
+        from hdcal.motion.dynamic_calibration import dynamic_calibration_of
 
-    with progress_bar() as progress:
-        posterior = sample(case, progress=progress, **settings)
-    found = calibration_of(posterior)
-    return console.show(
-        found,
-        figures=["calibration"],
-        tables={"bands.csv": found.bands.to_frame()},
-        others={FILE_NAME: posterior.to_netcdf},
-    )
+        with progress_bar() as progress:
+            posterior = sample(case, progress=progress, **settings)
+        found = dynamic_calibration_of(posterior)
+        files = {"figures": ["motion"], "tables": {"motion.csv": found.bands}}
+    else:
+        from hdcal.calibration.calibrate import calibrate as sample
+        from hdcal.calibration.calibration import calibration_of
 
-
-def _dynamic(console: Console, case: "Case", settings: dict[str, Any]) -> int:
-    """Calibrate a gear that moves, and return the exit code."""
-    from hdcal.cli.progress import progress_bar
-    from hdcal.inference.posterior_file import FILE_NAME
-    from hdcal.motion.dynamic_calibration import (
-        calibrate_dynamic,
-        dynamic_calibration_of,
-    )
-
-    with progress_bar() as progress:
-        posterior = calibrate_dynamic(case, progress=progress, **settings)
-    found = dynamic_calibration_of(posterior)
-    return console.show(
-        found,
-        figures=["motion"],
-        tables={"motion.csv": found.bands},
-        others={FILE_NAME: posterior.to_netcdf},
-    )
+        with progress_bar() as progress:
+            posterior = sample(case, progress=progress, **settings)
+        found = calibration_of(posterior)
+        bands = found.bands.to_frame()
+        files = {"figures": ["calibration"], "tables": {"bands.csv": bands}}
+    return console.show(found, **files, others={FILE_NAME: posterior.to_netcdf})

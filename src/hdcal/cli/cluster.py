@@ -19,15 +19,8 @@ def completed_on_cluster(
 ) -> Iterator[Any]:
     """Yield the result of `work` for every task, in the order of completion.
 
-    Args:
-        work: can be imported by name on the workers.
-        tasks: its arguments; taken as workers become free.
-        address: of the scheduler.
-        lost: remedy if the cluster is lost.
-
-    Raises:
-        InputError: Dask is not installed, or there is no scheduler or no worker.
-        HdcalError: the cluster was lost, or a task has killed several workers.
+    `work` can be imported by name on the workers; `tasks`, its arguments, are taken as
+    workers become free; `lost` is the remedy if the cluster is lost (`HdcalError`).
     """
     with _client(address) as client:
         from distributed import KilledWorker, as_completed
@@ -42,11 +35,10 @@ def completed_on_cluster(
                 future.release()
                 waiting.update(list(islice(begun, 1)))
                 yield outcome
-        except KilledWorker as error:
-            words = "one task has killed several workers (memory?)"
-            raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
-        except (CancelledError, OSError) as error:
+        except (KilledWorker, CancelledError, OSError) as error:
             words = "the connection to the scheduler was lost"
+            if isinstance(error, KilledWorker):
+                words = "one task has killed several workers (memory?)"
             raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
 
 

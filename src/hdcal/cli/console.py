@@ -28,25 +28,21 @@ def _would_replace_input(out: str) -> list[Finding]:
         return []
     read: list[str] = []
     for parameter in context.command.params:
-        given = context.params.get(str(parameter.name))
-        if isinstance(parameter, click.Argument) and given:
-            read += [given] if isinstance(given, str) else given
+        value = context.params.get(str(parameter.name))
+        if isinstance(parameter, click.Argument) and value:
+            read += [value] if isinstance(value, str) else value
     if os.path.realpath(out) not in map(os.path.realpath, read):
         return []
     return [Finding("out", f"{quoted(out)} is also an input", "Name another folder")]
 
 
 class Console:
-    """The two output streams of one command.
-
-    Attributes:
-        json: whether standard output carries one JSON object and nothing else.
-        wrong: findings about options and input, collected before the work.
-        folder: where the result goes; set by `reserve_folder`.
-    """
+    """The two output streams of one command."""
 
     def __init__(self, *, json: bool):
+        # Whether standard output carries one JSON object and nothing else.
         self.json = json
+        # Findings about options and input, collected before the work.
         self.wrong = Findings()
         self.folder: Target | None = None
 
@@ -70,10 +66,10 @@ class Console:
 
         Without --jobs: the same result has the same bytes.
         """
-        given, kept = iter(sys.argv[1:]), ["hdcal"]
-        for part in given:
+        parts, kept = iter(sys.argv[1:]), ["hdcal"]
+        for part in parts:
             if part == "--jobs":
-                next(given, None)
+                next(parts, None)
             elif not part.startswith("--jobs="):
                 kept.append(part)
         return shlex.join(kept)
@@ -81,12 +77,9 @@ class Console:
     def reserve_folder(
         self, out: str | None, force: bool, replace: str = "force"
     ) -> None:
-        """Reserve the result folder before any work, or add a finding.
+        """Reserve the result folder, if any, before any work, or add a finding.
 
-        Args:
-            out: the folder to make, or None.
-            force: whether an older result may be replaced.
-            replace: name of the parameter that allows it.
+        The parameter named `replace` allows to replace an older result.
         """
         if out is not None:
             from hdcal.report.saving import Target
@@ -95,11 +88,7 @@ class Console:
             self.folder = self.hold(partial(Target, out, force, replace))
 
     def hold(self, reserve: "Callable[[], Target]") -> "Target | None":
-        """Return a target that is locked until the command ends, or None.
-
-        Args:
-            reserve: makes the target; findings are collected.
-        """
+        """Return a target that is locked until the command ends, or None."""
         target = self.wrong.attempt(reserve)
         if target is not None:
             click.get_current_context().with_resource(target)
@@ -108,9 +97,7 @@ class Console:
     def show(self, result: "Result", **files: Any) -> int:
         """Write the reserved folder, if any; print the result; return the exit code.
 
-        Args:
-            result: what to write and print.
-            files: further arguments of `write_result`.
+        The files are further arguments of `write_result`.
         """
         if self.folder is not None:
             from hdcal.report.result_folder import write_result
@@ -144,17 +131,13 @@ class Console:
     def findings(
         self, findings: Iterable[Finding], show: Callable[[], None] | None = None
     ) -> None:
-        """Print every finding, and as JSON if --json was given.
-
-        Args:
-            findings: what is wrong.
-            show: prints them for people; by default each is one line.
-        """
+        """Print every finding, or call `show`, and as JSON if --json was given."""
         listed = list(findings)
         if show is not None:
             show()
-        for finding in listed if show is None else ():
-            self.words(str(finding))
+        else:
+            for finding in listed:
+                self.words(str(finding))
         if self.json:
             self.data({"status": "error", "findings": [asdict(f) for f in listed]})
 

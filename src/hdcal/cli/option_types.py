@@ -29,12 +29,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?0,\d+\s*")
 
 
 class Parsed(click.ParamType):
-    """An option read by a function; its findings are collected by the console.
-
-    Args:
-        name: shown in the help.
-        read: called with the text and the option's name; raises `InputError`.
-    """
+    """An option read by a function; its findings are collected by the console."""
 
     def __init__(self, name: str, read: Callable[[str, str], Any]):
         self.name = name
@@ -114,7 +109,11 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
 def read_grid(text: str, option: str) -> list[float]:
     """Read START:STOP:COUNT or a list of numbers with commas."""
     try:
-        numbers = _range(text) if ":" in text else [float(x) for x in text.split(",")]
+        if ":" in text:
+            first, last, many = text.split(":")
+            numbers = _between(float(first), float(last), int(many))
+        else:
+            numbers = [float(number) for number in text.split(",")]
     except ValueError:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
@@ -133,11 +132,6 @@ def read_deformations(text: str, option: str) -> list[float]:
         remedy = f"Write {first}.{second} for one, {first}:{float(second):g}:2 for two"
         raise _refused(option, problem, remedy)
     return read_grid(text, option)
-
-
-def _range(text: str) -> list[float]:
-    first, last, many = text.split(":")
-    return _between(float(first), float(last), int(many))
 
 
 def _between(start: float, stop: float, count: int) -> list[float]:
@@ -169,17 +163,12 @@ def read_named(
     fault: str = "is not NAME=…",
     example: str = "wall_thickness_mm=0.6:0.76:5",
 ) -> dict[str, T]:
-    """Read NAME=VALUE texts.
+    """Read NAME=VALUE texts, each value by `read`.
 
-    Args:
-        texts: as the user wrote them.
-        option: its name.
-        read: reads a value.
-        known: returns the allowed names; by default every name is.
-        fault: of a text of another form.
-        example: of the right form.
+    `known` returns the allowed names; by default every name is. The fault is that of a
+    text of another form than the example.
     """
-    found: dict[str, T] = {}
+    values: dict[str, T] = {}
     with Findings() as wrong:
         for text in texts:
             name, sign, rest = (part.strip() for part in text.partition("="))
@@ -187,33 +176,18 @@ def read_named(
                 remedy = f"Write it like {example}"
                 wrong.append(Finding(option, f"'{text}' {fault}", remedy))
                 continue
-            if name in found:
+            if name in values:
                 problem = f"'{name}' is given twice"
                 wrong.append(Finding(option, problem, "Keep one of them"))
             if known is not None and name not in known():
-                wrong.append(_unknown(name, known(), option))
-            try:
-                found[name] = read(rest, option)
-            except InputError as error:
-                wrong += error.findings
-    return found
+                from hdcal.data.findings import did_you_mean
 
-
-def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
-    from hdcal.data.findings import did_you_mean
-
-    return Finding(option, f"unknown key '{name}'", did_you_mean(name, list(known)))
-
-
-def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:
-    """Read QUANTITY=HEADER texts."""
-    return read_named(
-        texts,
-        option,
-        read=lambda header, _: header,
-        fault="names no header",
-        example="force=Load[kgf]",
-    )
+                remedy = did_you_mean(name, list(known()))
+                wrong.append(Finding(option, f"unknown key '{name}'", remedy))
+            value = wrong.attempt(read, rest, option)
+            if value is not None:
+                values[name] = value
+    return values
 
 
 ENDS = Parsed("LO:HI", read_ends)

@@ -10,7 +10,6 @@ from click.core import ParameterSource
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
     read_all,
-    read_columns,
     read_named,
     read_quantity,
 )
@@ -51,7 +50,12 @@ column_option = repeated_option(
     "--column",
     "columns",
     metavar="QUANTITY=HEADER",
-    read=read_columns,
+    read=partial(
+        read_named,
+        read=lambda header, _: header,
+        fault="names no header",
+        example="force=Load[kgf]",
+    ),
     help="Read a quantity from a column: force=Load[kgf]. May be repeated.",
 )
 # How cases are read.
@@ -67,9 +71,7 @@ reading_options = combined(
         help="Decode the data file with this encoding [default: detected].",
     ),
     click.option(
-        "--specimen",
-        metavar="LABEL",
-        help="Read the rows of this specimen only.",
+        "--specimen", metavar="LABEL", help="Read the rows of this specimen only."
     ),
     sheet_option,
     column_option,

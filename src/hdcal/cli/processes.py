@@ -19,16 +19,15 @@ def run_all(
     jobs: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Any]:
-    """Return the result of `work` for every task, in their order.
+    """Return the result of `work` for every task, its arguments, in their order.
 
-    Args:
-        work: can be imported by name if there are several jobs.
-        tasks: its arguments.
-        jobs: number of processes; one is this process, which keeps compiled code.
-        progress: called with the numbers of done and of all tasks.
+    Of several jobs each is a process, which imports `work` by name; a single one is
+    this process, which keeps compiled code. `progress` takes the numbers of done and of
+    all tasks.
     """
     report = progress or (lambda done, total: None)
-    if min(jobs, len(tasks)) == 1:
+    jobs = min(jobs, len(tasks))
+    if jobs == 1:
         results = []
         for task in tasks:
             results.append(work(*task))
@@ -37,9 +36,7 @@ def run_all(
     others = {*multiprocessing.active_children()}
     # A fork of a process in which JAX has started hangs.
     spawn = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        min(jobs, len(tasks)), mp_context=spawn, initializer=_begin
-    )
+    pool = ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_begin)
     try:
         futures = [pool.submit(work, *task) for task in tasks]
         for done, future in enumerate(as_completed(futures), start=1):

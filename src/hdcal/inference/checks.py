@@ -48,7 +48,7 @@ def _check(name: str, passed: bool, words: str) -> Check:
 
 
 def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check, ...]:
-    """Return the checks on NUTS: any of them failed fails the result."""
+    """Return the checks on NUTS."""
     from arviz_stats.base.array import array_stats
 
     # NaN, which no check passes, where the energy does not change.
@@ -74,18 +74,15 @@ def sampling_checks(draws: "Draws", mixed: Mapping[str, Mixing]) -> tuple[Check,
 def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]:
     """Return the checks on the convergence of each quantity, for any sampler."""
     # Constant or infinite draws give NaN, which counts as the worst.
-    rhat = {n: np.nan_to_num(one.rhat, nan=np.inf) for n, one in mixed.items()}
-    size = {
-        n: min(np.nan_to_num([one.ess_bulk, one.ess_tail])) for n, one in mixed.items()
-    }
+    rhat = {n: np.nan_to_num(m.rhat, nan=np.inf) for n, m in mixed.items()}
+    size = {n: min(np.nan_to_num([m.ess_bulk, m.ess_tail])) for n, m in mixed.items()}
     worst, least = max(rhat, key=rhat.__getitem__), min(size, key=size.__getitem__)
     need = ESS_PER_CHAIN * chains
     return (
         _check(
             "chains agree (R-hat)",
             rhat[worst] <= MAX_RHAT,
-            f"the largest R-hat is {mixed[worst].rhat:.4f} ({worst}), allowed "
-            f"{MAX_RHAT}",
+            f"the largest R-hat is {rhat[worst]:.4f} ({worst}), allowed {MAX_RHAT}",
         ),
         _check(
             "enough effective draws (bulk and tail ESS)",
@@ -107,8 +104,7 @@ def correlation_check(
         draws[CORRELATION], [0.05, 0.025, 0.5, 0.975]
     )
     if least < _REPORTED_CORRELATION:
-        words = "the readings show no correlation of neighbours"
-        return Check(INDEPENDENT, "passed", words)
+        return Check(INDEPENDENT, "passed", "the readings show no correlation")
     words = (
         "the errors of neighbouring readings have a correlation of "
         f"{middle:.2f} ({low:.2f} to {high:.2f}, 95 %)"
@@ -117,14 +113,12 @@ def correlation_check(
     effective = (rows - (rows - 2) * middle) / (1.0 + middle)
     if middle < _STRONG_CORRELATION or effective > _FEW_EFFECTIVE:
         return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
-    return Check(
-        INDEPENDENT,
-        "warning",
-        f"{words}. Every interval allows for it, but these readings are equivalent to "
-        f"some {effective:.0f} independent ones, and 95 % intervals contain the truth "
-        "less often: in 85 % of ramps of 60 rows with a correlation of 0.9. Read "
-        "longer or repeat",
+    words += (
+        ". Every interval allows for it, but these readings are equivalent to some "
+        f"{effective:.0f} independent ones: 95 % intervals can contain the truth in "
+        "85 % of cases only. Read longer or repeat"
     )
+    return Check(INDEPENDENT, "warning", words)
 
 
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
@@ -166,11 +160,9 @@ def conflict_check(
         remedy = "Where the rig explains it, state a prior for it"
     else:
         name = PLAUSIBLE
-        remedy = (
-            "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
-        )
-    each = listed([f"{parameter} = {words}" for parameter, words in far.items()])
-    words = f"far outside what was expected before the data: {each}. {remedy}"
+        remedy = "Check units, reading (radial or diametral) and sizes of the gear"
+    medians = listed([f"{parameter} = {words}" for parameter, words in far.items()])
+    words = f"far outside what was expected before the data: {medians}. {remedy}"
     return Check(name, "warning", words)
 
 

@@ -22,13 +22,7 @@ _SMALLEST = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class Mixing:
-    """Convergence of the chains in one quantity.
-
-    Attributes:
-        rhat: rank-normalised split R-hat; NaN where all draws are equal.
-        ess_bulk: effective sample size of the centre.
-        ess_tail: effective sample size of the ends of the interval.
-    """
+    """Convergence of the chains in one quantity; R-hat is NaN where draws are equal."""
 
     rhat: float
     ess_bulk: float
@@ -37,13 +31,9 @@ class Mixing:
 
 @dataclass(frozen=True)
 class Convergence(Mixing):
-    """Convergence of a parameter, and what decides it.
+    """Convergence of a parameter, and what decides it."""
 
-    Attributes:
-        contraction: 1 − var(posterior)/var(prior), of a lognormal prior in logarithms.
-        driven_by: whether the data or the prior decide the parameter.
-    """
-
+    # 1 − var(posterior)/var(prior), of a lognormal prior in logarithms.
     contraction: float
     driven_by: Driver
 
@@ -53,35 +43,30 @@ def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
     # Importing arviz-stats takes a second.
     from arviz_stats.base.array import array_stats
 
-    found = {}
+    def of(values: np.ndarray) -> Mixing:
+        numbers = (
+            array_stats.rhat(values),
+            array_stats.ess(values),
+            array_stats.ess(values, method="tail", prob=_TAIL),
+        )
+        return Mixing(*(np.asarray(number).item() for number in numbers))
+
     with np.errstate(all="ignore"):
-        for name, values in draws.items():
-            values = np.asarray(values, float)
-            numbers = (
-                array_stats.rhat(values),
-                array_stats.ess(values),
-                array_stats.ess(values, method="tail", prob=_TAIL),
-            )
-            found[name] = Mixing(*(np.asarray(number).item() for number in numbers))
-    return found
+        return {name: of(np.asarray(v, float)) for name, v in draws.items()}
 
 
 def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
     """Return whether the chains of every quantity have mixed, (chain, draw) each."""
     # Comparisons with NaN, the R-hat of equal draws, are false.
     return all(
-        one.rhat <= MAX_RHAT
-        and min(one.ess_bulk, one.ess_tail) >= ESS_PER_CHAIN * len(draws[name])
-        for name, one in mixing(draws).items()
+        mixed.rhat <= MAX_RHAT
+        and min(mixed.ess_bulk, mixed.ess_tail) >= ESS_PER_CHAIN * len(draws[name])
+        for name, mixed in mixing(draws).items()
     )
 
 
 def pareto_shape(weight: np.ndarray) -> float:
-    """Return the Pareto k of importance weights (n,); infinite if few are above zero.
-
-    Raises:
-        ValueError: the largest weights are equal.
-    """
+    """Return the Pareto k of importance weights (n,); infinite if few are positive."""
     from arviz_stats.base.array import array_stats
 
     # The tail that is fitted would hold weights of zero.
@@ -95,12 +80,14 @@ def diagnose_parameters(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> dict[str, Convergence]:
     """Return the convergence of each scalar parameter, and what decides it."""
-    found = {}
+    diagnoses = {}
     for name, mixed in mixing(draws).items():
         share = _contraction(draws[name], priors[name], name)
         driver: Driver = "data" if share >= MIN_CONTRACTION else "prior"
-        found[name] = Convergence(**asdict(mixed), contraction=share, driven_by=driver)
-    return found
+        diagnoses[name] = Convergence(
+            **asdict(mixed), contraction=share, driven_by=driver
+        )
+    return diagnoses
 
 
 def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:

@@ -17,11 +17,7 @@ POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma
 
 
 def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
-    """Return the NumPyro distribution of the prior of a parameter.
-
-    Raises:
-        ValueError: the family has none, such as a fixed value.
-    """
+    """Return the NumPyro distribution of a prior; `ValueError` if it is fixed."""
     import numpyro.distributions as dist
 
     first, second = (*prior.numbers, math.nan)[:2]
@@ -42,11 +38,7 @@ def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
 
 
 def frozen(prior: Prior, name: str = "") -> Any:
-    """Return the SciPy distribution of the prior of a parameter.
-
-    Raises:
-        ValueError: the family has none, such as a fixed value.
-    """
+    """Return the SciPy distribution of a prior; `ValueError` if it is fixed."""
     return _frozen(prior.family, (*map(float, prior.numbers),), name in POSITIVE)[0]
 
 

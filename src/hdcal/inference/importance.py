@@ -2,12 +2,8 @@
 
 Three multivariate t distributions propose, of one centre and increasing width. In
 rounds they take mean and covariance of the weighted proposals; then proposals are
-resampled. Where they cover the posterior badly nothing is returned.
-
-Source:
-    Cappé, Guillin, Marin and Robert, Journal of Computational and Graphical Statistics
-    13 (2004), population Monte Carlo; Vehtari et al., Journal of Machine Learning
-    Research 25 (2024), Pareto k.
+resampled (Cappé et al., Journal of Computational and Graphical Statistics 13, 2004;
+Pareto k: Vehtari et al., Journal of Machine Learning Research 25, 2024).
 """
 
 from typing import Any, NamedTuple
@@ -42,10 +38,7 @@ _BLOCK = 500
 
 
 class Proposals(NamedTuple):
-    """Multivariate t distributions of increasing width about one centre.
-
-    The scale matrix is that of the narrowest one.
-    """
+    """Multivariate t distributions about one centre, with the narrowest's scale."""
 
     centre: np.ndarray
     covariance: np.ndarray
@@ -151,16 +144,15 @@ def _weights(
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
-    def one(place):
-        return potential(problem, whitening.position(place))
-
     # One after the other: side by side many gears fill the memory.
-    return jax.lax.map(one, standard)
+    return jax.lax.map(
+        lambda place: potential(problem, whitening.position(place)), standard
+    )
 
 
 @jax.jit
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
-    def one(place):
+    def values(place):
         return values_at(problem, whitening.position(place))
 
-    return jax.vmap(lambda group: jax.lax.map(one, group))(standard)
+    return jax.vmap(lambda group: jax.lax.map(values, group))(standard)

@@ -58,9 +58,7 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     """Find the posterior mode and its curvature.
 
     A poor mode costs speed, never correctness: NUTS samples the exact density in any
-    coordinates.
-
-    The search starts at roughly known values of sites, and else in the middle of the
+    coordinates. The search starts at known values of sites, else in the middle of the
     priors.
     """
     place, flat = _start(problem, dict(start or {}))

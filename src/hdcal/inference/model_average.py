@@ -28,10 +28,7 @@ _WEIGHT, _LEFT_OUT = "probability", "left_out"
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Probability of all hypotheses without a usable calibration.
-
-    It is added to that of the calibrated hypothesis `counted_as`.
-    """
+    """Probability of hypotheses without a calibration, counted as that of another."""
 
     probability: float
     counted_as: str
@@ -100,9 +97,9 @@ class ModelAverage:
             raise not_a_posterior(file) from error
         posteriors = {}
         for name, share in sorted(shares.items(), key=lambda item: -item[1]):
-            one = Posterior.from_tree(tree.children[name], file, effects)
-            one = replace(one, settings={**one.settings, HYPOTHESIS: name})
-            posteriors[name] = float(share), one
+            model = Posterior.from_tree(tree.children[name], file, effects)
+            model = replace(model, settings={**model.settings, HYPOTHESIS: name})
+            posteriors[name] = float(share), model
         return cls(posteriors, left_out)
 
 

@@ -44,19 +44,10 @@ Library = Mapping[str, type[Effect]]
 
 @dataclass(frozen=True, repr=False)
 class Posterior(Shown):
-    """A calibration: draws in code units, priors, checks and provenance.
+    """A calibration: draws and priors in code units, checks and provenance.
 
-    Attributes:
-        case: data and gear.
-        theory: which stiffness K multiplies.
-        effects: effects in the model.
-        priors: of every site, in code units, K under `theory`.
-        tree: the groups posterior, prior, sample_stats, observed_data, constant_data
-            and log_likelihood, for ArviZ.
-        diagnoses: convergence and driver by parameter.
-        checks: with their outcomes.
-        settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
-            `STRUCTURE`.
+    The tree has ArviZ' groups posterior, prior, sample_stats, observed_data,
+    constant_data and log_likelihood.
     """
 
     kind: ClassVar[str] = "static"
@@ -102,8 +93,8 @@ class Posterior(Shown):
     @cached_property
     def problem(self) -> Problem:
         """The inference problem that was sampled."""
-        given = {"theory": self.theory, "structure": self.structure}
-        return build_problem(self.case, self.priors, self.effects, **given)
+        form = {"theory": self.theory, "structure": self.structure}
+        return build_problem(self.case, self.priors, self.effects, **form)
 
     @cached_property
     def median(self) -> dict[str, np.ndarray]:
@@ -137,7 +128,7 @@ class Posterior(Shown):
             "effects": [effect.name for effect in self.effects],
             "priors": {n: asdict(prior) for n, prior in self.priors.items()},
             "settings": dict(self.settings),
-            "diagnoses": {n: asdict(one) for n, one in self.diagnoses.items()},
+            "diagnoses": {n: asdict(found) for n, found in self.diagnoses.items()},
             "checks": [asdict(check) for check in self.checks],
         }
         return {
@@ -148,15 +139,10 @@ class Posterior(Shown):
 
     @classmethod
     def load(cls, path: Path | str, effects: Library | None = None) -> Self:
-        """Read the posterior of one model.
+        """Read the posterior of one model from a result folder or its posterior.nc.
 
-        The path is a result folder or its posterior.nc. Effects from outside need
-        their library.
-
-        Raises:
-            InputError: the file is missing, damaged, changed, of several models or
-                from another version, or names an effect that the library lacks.
-            NotUsable: the folder is of a diagnosis that failed.
+        `InputError` if the file is missing, damaged, changed, of several models or from
+        another version, or names an effect that the library of effects lacks.
         """
         file = file_of(path)
         return cls.from_tree(read_tree(file), file, effects)

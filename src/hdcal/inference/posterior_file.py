@@ -3,14 +3,13 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
 
 from hdcal.data.findings import why_not_readable
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, InputError
 
 FILE_NAME = "posterior.nc"
 # Attributes that hold the format, and the digest of everything else.
@@ -48,30 +47,25 @@ def content(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, str]) -> byt
 
 
 def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
-    """Return the content of a posterior file.
-
-    Raises:
-        InputError: it is missing, damaged, changed, or of another kind or version.
-        NotUsable: it belongs to a diagnosis that failed.
-    """
+    """Return the content of a posterior file; `InputError` if it cannot be used."""
     if (why := why_not_readable(path, _LARGEST_FILE)) is not None:
         raise InputError([Finding(str(path), *why)])
     try:
         tree = xr.load_datatree(path, engine="h5netcdf")
     except FileNotFoundError as error:
-        raise _missing(path) from error
+        remedy = "Name the folder of a calibration that did not fail"
+        raise InputError(
+            [Finding(str(path), "there is no such file", remedy)]
+        ) from error
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
     format_name = tree.attrs.get(FORMAT)
     if (written := _kind(format_name)) is None:
         raise not_a_posterior(path, kind)
-    if written is not kind:
-        problem = f"is {written.words}, and one {kind.words} is needed"
-        remedy = f"Name the result folder {kind.words}"
-    elif format_name != kind.format:
-        problem = f"has the format {format_name}, and this hdcal reads {kind.format}"
-        remedy = f"Use the hdcal that wrote it, or {kind.again}"
+    if format_name != kind.format:
+        problem = f"is {written.words} ({format_name}), and {kind.format} is needed"
+        remedy = f"Name the result folder {kind.words}, or {kind.again}"
     elif tree.attrs.get(DIGEST) != digest(tree):
         problem = "was changed after hdcal wrote it"
         remedy = f"Take the file as it was written, or {kind.again}"
@@ -88,8 +82,8 @@ def digest(tree: xr.DataTree) -> str:
         whole.update(json.dumps([node.path, attributes], sort_keys=True).encode())
         variables = node.to_dataset(inherit=False).variables
         for name in sorted(map(str, variables)):
-            one, values = variables[name], variables[name].values
-            whole.update(json.dumps([name, one.dims, one.shape]).encode())
+            variable, values = variables[name], variables[name].values
+            whole.update(json.dumps([name, variable.dims, variable.shape]).encode())
             is_numeric = values.dtype.kind in "biuf"
             texts = b"" if is_numeric else json.dumps(values.tolist()).encode()
             whole.update(values.tobytes() if is_numeric else texts)
@@ -107,15 +101,3 @@ def _kind(written: object) -> Kind | None:
     name = str(written).rpartition("/")[0]
     kinds = CALIBRATION, FLEET
     return next((kind for kind in kinds if kind.format.startswith(f"{name}/")), None)
-
-
-def _missing(path: Path) -> InputError | NotUsable:
-    """Return the error for a file that is not there, as of a failed diagnosis."""
-    verdict = {}
-    with suppress(OSError, ValueError):
-        verdict = json.loads((path.parent / "verdict.json").read_bytes())
-    if verdict.get("status") == "failed":
-        reasons = "; ".join(map(str, verdict.get("reasons", ())))
-        return NotUsable(f"this diagnosis failed and must not be used: {reasons}")
-    remedy = "Name the folder of a calibration"
-    return InputError([Finding(str(path), "there is no such file", remedy)])

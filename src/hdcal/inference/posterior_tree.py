@@ -96,8 +96,8 @@ def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
 def joined_draws(tree: xr.DataTree) -> dict[str, np.ndarray]:
     """Return all draws of the posterior by site, chains joined: [draw, …]."""
     return {
-        str(name): one.values.reshape(-1, *one.shape[2:])
-        for name, one in group_of(tree, "posterior").data_vars.items()
+        str(name): draws.values.reshape(-1, *draws.shape[2:])
+        for name, draws in group_of(tree, "posterior").data_vars.items()
     }
 
 
@@ -111,8 +111,8 @@ def to_json(plain: Any) -> str:
 def restore_priors(held: Mapping[str, Mapping]) -> dict[str, Prior]:
     """Return priors from the dictionaries that `asdict` makes."""
     return {
-        name: Prior(**{**one, "numbers": tuple(one["numbers"])})
-        for name, one in held.items()
+        name: Prior(**{**fields, "numbers": tuple(fields["numbers"])})
+        for name, fields in held.items()
     }
 
 

@@ -82,7 +82,6 @@ def sample(
     Coordinates are those of `laplace.fit`. Numbers of iterations are those of each
     chain: `warmup` for adaptation, and `draws` kept, or a multiple of them.
     """
-    found = None
     for target in TARGET_ACCEPTANCE:
         run = _Run(problem, whitening, seed, chains, warmup, progress, target)
         is_last = target == TARGET_ACCEPTANCE[-1]
@@ -90,21 +89,16 @@ def sample(
         if run.diverged and not is_last:
             continue
         found = _extended(run, draws)
-        if not found.statistics["diverging"].any():
-            break
-    assert found is not None
-    return found
+        if is_last or not found.statistics["diverging"].any():
+            return found
+    raise AssertionError
 
 
 def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
-    """Check that a run is long enough for its checks, and not endless.
-
-    Raises:
-        InputError: it is not.
-    """
-    given = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
+    """Raise `InputError` if a run is too short for its checks, or endless."""
+    settings = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
     with Findings() as wrong:
-        for name, value in given.items():
+        for name, value in settings.items():
             wrong += implausible(name, value)
 
 
@@ -142,12 +136,12 @@ class _Run:
             # Stretches end with the warm-up, for few lengths.
             left = (warmup if self._done < warmup else total) - self._done
             size = {"warmup": warmup, "length": min(_STRETCH, left)}
-            each = [
+            moved = [
                 _advance(*self._arguments, state, self._target, **size)
                 for state in self._states
             ]
-            self._states = [state for state, _ in each]
-            kept = jax.device_get([kept for _, kept in each])
+            self._states = [state for state, _ in moved]
+            kept = jax.device_get([kept for _, kept in moved])
             if self._done >= warmup:
                 self._kept.append(jax.tree.map(lambda *parts: np.stack(parts), *kept))
             self._done += size["length"]
@@ -201,14 +195,14 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
     # The step function takes its settings from the last call of its init.
     structure = jax.tree.structure(start(jnp.zeros(len(whitening.factor))))
 
-    def one(state, _):
+    def advance(state, _):
         state = step(state)
         kept = {name: getattr(state, its) for name, its in _STATISTICS.items()}
         size = state.adapt_state.step_size
         return state, {**kept, "standard": state.z, "step_size": size}
 
     state = jax.tree.unflatten(structure, leaves)
-    state, kept = jax.lax.scan(one, state, length=length)
+    state, kept = jax.lax.scan(advance, state, length=length)
     return jax.tree.leaves(state), kept
 
 
@@ -218,7 +212,7 @@ def _constrain(problem, whitening, standard, seed):
     _, members = jax.random.split(jax.random.key(seed))
     chains, draws, _ = standard.shape
 
-    def one(drawn):
+    def values(drawn):
         coordinates, key = drawn
         named = values_at(problem, whitening.position(coordinates))
         return named | draw_members(problem, named, key)
@@ -227,6 +221,6 @@ def _constrain(problem, whitening, standard, seed):
         # The key of a draw does not depend on the length of the run.
         keys = jax.vmap(partial(jax.random.fold_in, key))(jnp.arange(draws))
         # One draw after the other: members by the hundred would fill the memory.
-        return jax.lax.map(one, (coordinates, keys))
+        return jax.lax.map(values, (coordinates, keys))
 
     return jax.vmap(chain)(standard, jax.random.split(members, chains))

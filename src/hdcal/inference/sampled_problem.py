@@ -9,13 +9,7 @@ from hdcal.data.priors import Prior
 
 
 class Sampled(eqx.Module):
-    """A pytree of data and priors that declares its density.
-
-    Sampler, whitening and checks serve every subclass.
-
-    Attributes:
-        priors: by site name, in code units.
-    """
+    """A pytree of data and priors, by site in code units, that declares its density."""
 
     if TYPE_CHECKING:
         priors: dict[str, Prior]

@@ -6,8 +6,8 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import FORCE, read_columns
-from hdcal.cli.options import json_option, repeated_option, seed_option
+from hdcal.cli.option_types import FORCE
+from hdcal.cli.options import column_option, json_option, seed_option
 from hdcal.errors import Finding
 
 
@@ -19,13 +19,7 @@ from hdcal.errors import Finding
     metavar="F.csv|step",
     help="Apply this force: a table with time_s and force_N, or a step.",
 )
-@repeated_option(
-    "--column",
-    "columns",
-    metavar="QUANTITY=HEADER",
-    read=read_columns,
-    help="Read a quantity of F.csv from a column: force=Load[kgf].",
-)
+@column_option
 @click.option(
     "--amplitude", type=FORCE, help="Set the amplitude of a step [N] [default: 80]."
 )

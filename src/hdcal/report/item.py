@@ -25,17 +25,13 @@ Draws = Annotated[np.ndarray, Field(exclude=True)]
 def quantity(
     label: str, unit: str = "", *, column: str | None = None, **limits: Any
 ) -> Any:
-    """Declare a field.
+    """Declare a field with a label, a unit, and a column other than its name.
 
-    Args:
-        label: on axes and in tables.
-        unit: empty for a dimensionless number.
-        column: name in tables; by default that of the field.
-        limits: constraints, as of pydantic's `Field`.
+    The limits are constraints, as of pydantic's `Field`.
     """
-    extra = {"unit": unit, "column": column}
-    given = {name: text for name, text in extra.items() if text}
-    return Field(title=label, json_schema_extra=given or None, **limits)
+    extra: dict[str, Any] = {"unit": unit, "column": column}
+    extra = {name: text for name, text in extra.items() if text}
+    return Field(title=label, json_schema_extra=extra or None, **limits)
 
 
 def _json_name(name: str) -> str:
@@ -73,21 +69,20 @@ class Item(BaseModel):
         An interval `stiffness_N_per_mm` has the columns `stiffness_N_per_mm` of its
         median, `stiffness_lo` and `stiffness_hi`.
         """
-        found: dict[str, Any] = {}
+        columns: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
             column = self._extra(name, "column") or _json_name(name)
             if isinstance(value, Interval):
                 unit = self._extra(name, "unit").replace("/", "_per_")
                 stem = column.removesuffix(f"_{unit}")
-                found |= {column: value.median}
-                found |= {f"{stem}_lo": value.lo, f"{stem}_hi": value.hi}
+                columns |= {column: value.median}
+                columns |= {f"{stem}_lo": value.lo, f"{stem}_hi": value.hi}
             elif isinstance(value, Item):
-                inner = value.columns().items()
-                found |= {f"{column}_{key}": each for key, each in inner}
+                columns |= {f"{column}_{n}": v for n, v in value.columns().items()}
             elif not field.exclude and not isinstance(value, tuple | dict):
-                found[column] = value
-        return found
+                columns[column] = value
+        return columns
 
 
 class Interval(Item):
@@ -119,10 +114,8 @@ def with_units(value: Any, plain: Any, units: Quantities) -> Any:
         held = {key: getattr(value, str(names.get(key, key))) for key in plain}
         return {units.key(k): with_units(held[k], plain[k], units) for k in plain}
     if isinstance(value, Mapping):
-        return {k: with_units(each, plain[k], units) for k, each in value.items()}
+        return {k: with_units(item, plain[k], units) for k, item in value.items()}
     if isinstance(value, tuple):
-        return [
-            with_units(each, item, units)
-            for each, item in zip(value, plain, strict=True)
-        ]
+        pairs = zip(value, plain, strict=True)
+        return [with_units(item, form, units) for item, form in pairs]
     return plain

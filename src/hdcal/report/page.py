@@ -11,7 +11,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hdcal.report.charts.chart_browser import chart_json
-from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.markdown import folded, html, parsed
 
 if TYPE_CHECKING:
@@ -28,19 +27,22 @@ _INTERACTIVE = Markup(
 def html_page(
     result: "Result", command: str = "", images: Mapping[str, bytes] | None = None
 ) -> str:
-    """Return a result as the text of an HTML file.
+    """Return a result as the text of an HTML file, with the command that made it.
 
-    Args:
-        result: what to show.
-        command: the command line that made it.
-        images: SVG by chart; by default they are drawn.
+    The images are SVG by chart; by default they are drawn.
     """
     charts = result.charts()
-    drawn = _drawn(charts) if images is None else images
+    if images is None:
+        from hdcal.report.charts import chart_drawing
+
+        images = {
+            name: chart_drawing.images(chart, kinds=("svg",))["svg"]
+            for name, chart in charts.items()
+        }
 
     def figure(name: str, shows: str, caption: str) -> str:
         # SVG in an image runs no script and shares no names with the page.
-        image = _IMAGE.format(base64.b64encode(drawn[name]).decode("ascii"), shows)
+        image = _IMAGE.format(base64.b64encode(images[name]).decode("ascii"), shows)
         if not charts[name].interactive:
             return _FIGURE.format("", image, caption)
         image += _INTERACTIVE.format(Markup(chart_json(charts[name])))
@@ -53,35 +55,38 @@ def html_page(
         style += _part("uplot.css")
         script += _part("uplot.js") + _part("touch.js")
     names = ("title", "subtitle", "headline", "next_step")
-    page = _environment().get_template("result.html.j2")
-    return page.render(
-        {name: _inline(result, name) for name in names},
-        result=result,
-        name=result.line("title"),
-        body=Markup(body),
-        more=Markup(more),
-        style=Markup(style),
-        script=Markup(script),
-        policy=Markup(_policy(style, script)),
+    return (
+        _environment()
+        .get_template("result.html.j2")
+        .render(
+            {name: _inline(result, name) for name in names},
+            result=result,
+            name=result.line("title"),
+            body=Markup(body),
+            more=Markup(more),
+            style=Markup(style),
+            script=Markup(script),
+            policy=Markup(_policy(style, script)),
+        )
     )
 
 
 def sheet_page(result: "Result", block: str, signed: Mapping[str, str]) -> str:
     """Return a block of a result as the text of an HTML page to print and sign.
 
-    Args:
-        result: of the template.
-        block: name of the block.
-        signed: texts above the lines of signature, by the names below them.
+    `signed` are the texts above the lines of signature, by the names below them.
     """
     style = _part("style.css")
-    page = _environment().get_template("sheet.html.j2")
-    return page.render(
-        name=result.line("title"),
-        body=Markup(html(parsed(result.block(block)))),
-        signed={**signed, "signature": ""},
-        style=Markup(style),
-        policy=Markup(_policy(style, "")),
+    return (
+        _environment()
+        .get_template("sheet.html.j2")
+        .render(
+            name=result.line("title"),
+            body=Markup(html(parsed(result.block(block)))),
+            signed={**signed, "signature": ""},
+            style=Markup(style),
+            policy=Markup(_policy(style, "")),
+        )
     )
 
 
@@ -97,14 +102,6 @@ def notebook_html(result: "Result") -> str:
     return first + Markup(html(parsed(result.block("body")))) + Markup("</div>")
 
 
-def _drawn(charts: Mapping[str, Chart]) -> dict[str, bytes]:
-    from hdcal.report.charts.chart_drawing import images
-
-    return {
-        name: images(chart, kinds=("svg",))["svg"] for name, chart in charts.items()
-    }
-
-
 def _inline(result: "Result", block: str) -> Markup:
     """Return a block of one paragraph as HTML without the paragraph's tags."""
     tokens = parsed(result.block(block).strip())
@@ -117,15 +114,14 @@ def _part(name: str) -> str:
 
 def _policy(style: str, script: str) -> str:
     """Return a content security policy: only this style, this script and images."""
-    allowed = f"style-src {_hash(style)}; img-src data:"
-    if script:
-        allowed += f"; script-src {_hash(script)}"
+
+    def source(text: str) -> str:
+        digest = base64.b64encode(sha256(text.encode()).digest()).decode("ascii")
+        return f"'sha256-{digest}'"
+
+    allowed = f"style-src {source(style)}; img-src data:"
+    allowed += f"; script-src {source(script)}" if script else ""
     return f"default-src 'none'; {allowed}; base-uri 'none'; form-action 'none'"
-
-
-def _hash(text: str) -> str:
-    digest = base64.b64encode(sha256(text.encode()).digest()).decode("ascii")
-    return f"'sha256-{digest}'"
 
 
 @cache

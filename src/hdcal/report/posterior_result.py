@@ -33,12 +33,7 @@ class Quantity(Interval):
 class ParameterEstimate(Quantity):
     """A parameter with its diagnostics, NaN if the gear file fixes it.
 
-    Attributes:
-        rhat: rank-normalised split R-hat.
-        ess_bulk: effective sample size of the centre.
-        ess_tail: effective sample size of the interval's ends.
-        contraction: share of the prior's variance that the data removed.
-        driven_by: whether the data or the prior determine it.
+    The contraction is the share of the prior's variance that the data removed.
     """
 
     rhat: float
@@ -77,15 +72,10 @@ class CalibratedData(Item):
 
 
 class PosteriorResult(Result):
-    """A result with a sampled posterior.
+    """A result with a sampled posterior; parameters that are fixed come last.
 
-    Attributes:
-        warnings: sentences.
-        parameters: by name, fixed ones last.
-        stiffness_N_per_mm: at the reference temperature, per mm as read.
-        flat_directions: sentences about what the data do not determine.
-        interval: probability of every interval.
-        versions: of the packages that made the draws.
+    The stiffness is at the reference temperature. Flat directions are sentences about
+    what the data do not determine.
     """
 
     table = "quantities"
@@ -111,18 +101,19 @@ class PosteriorResult(Result):
         """The intervals of the result, such as the stiffness, then the parameters."""
         derived = {}
         for name in type(self).model_fields:
-            if isinstance(one := getattr(self, name), Interval):
+            if isinstance(interval := getattr(self, name), Interval):
                 unit = self._extra(name, "unit")
                 suffix = unit.replace("/", "_per_").replace("·", "_")
-                named = {**one.model_dump(), "unit": self.units.unit(unit) or "1"}
-                derived[name.removesuffix(f"_{suffix}")] = Quantity(**named)
+                shown = self.units.unit(unit) or "1"
+                quantity = Quantity(**interval.model_dump(), unit=shown)
+                derived[name.removesuffix(f"_{suffix}")] = quantity
         return {**derived, **self.parameters}
 
     @property
     def measured(self) -> Mapping[str, ParameterEstimate]:
         """The parameters without those that the theory defines."""
         defined = {"E0"} if self.gear.theory == SPRING else set()
-        return {n: one for n, one in self.parameters.items() if n not in defined}
+        return {n: found for n, found in self.parameters.items() if n not in defined}
 
     @property
     def least_contraction(self) -> float:
@@ -199,13 +190,13 @@ def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
 
 def _estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
     """Return every parameter's estimate by name, fixed parameters last."""
-    found, draws, nan = posterior.diagnoses, posterior.draws, math.nan
-    fixed = [n for n in posterior.priors if n in draws and n not in found]
+    diagnoses, draws, nan = posterior.diagnoses, posterior.draws, math.nan
+    fixed = [n for n in posterior.priors if n in draws and n not in diagnoses]
     by_file = Convergence(nan, nan, nan, contraction=0.0, driven_by="prior")
     estimates = {}
-    for name in (*found, *fixed):
+    for name in (*diagnoses, *fixed):
         unit, factor = unit_of(posterior, name)
         interval = Interval.of(draws[name] * factor)
-        diagnosis = asdict(found.get(name, by_file))
+        diagnosis = asdict(diagnoses.get(name, by_file))
         estimates[name] = ParameterEstimate(**dict(interval), unit=unit, **diagnosis)
     return estimates

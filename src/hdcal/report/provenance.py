@@ -9,7 +9,7 @@ from hdcal.data.case import Case
 from hdcal.data.loading import loading
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.posterior import Posterior
-from hdcal.report.words import number, with_unit
+from hdcal.report.words import number
 
 
 def provenance_rows(posterior: Posterior) -> list[tuple[str, str]]:
@@ -34,7 +34,7 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
 
     def ends(values, shown: str) -> str:
         low, high = number(float(np.min(values))), number(float(np.max(values)))
-        return with_unit(low if low == high else f"{low} … {high}", shown)
+        return f"{low if low == high else f'{low} … {high}'} {shown}"
 
     moves = {"loading": 1, "holding": 0, "unloading": -1}
     way = loading(np.asarray(records.deformation), np.asarray(records.direction))

@@ -33,21 +33,16 @@ _RULE = {
 
 
 class Result(Item):
-    """The answer to a question.
+    """The answer to a question, or the reasons why it must not be used.
 
     A subclass declares the field `format`, called `schema` in the JSON: a `Literal`
     with name and version of the format as its default.
-
-    Attributes:
-        template: path of the Markdown template inside the package.
-        table: name of the attribute with the main table: items, or items by name.
-        reasons: why the result must not be used; empty if it may be.
-        part: word for what was measured.
-        units: names and units of what was measured.
     """
 
     model_config = ConfigDict(json_schema_extra={"allOf": [_RULE]})
+    # Path of the Markdown template inside the package.
     template: ClassVar[str]
+    # Name of the attribute with the main table: items, or items by name.
     table: ClassVar[str]
 
     reasons: tuple[Words, ...] = ()
@@ -85,11 +80,7 @@ class Result(Item):
     ) -> str:
         """Return a block of the template in Markdown; empty if there is none.
 
-        Args:
-            name: of the block.
-            command: the command line that made the result.
-            plain: without the escapes of Markdown.
-            on_page: whether it is for the HTML page.
+        A plain one has no escapes of Markdown.
         """
         values = {
             "result": self,
@@ -106,13 +97,13 @@ class Result(Item):
 
     def lines(self, name: str) -> tuple[str, ...]:
         """Return a block of the template as plain text, one sentence a line."""
-        found = map(str.strip, self.block(name, plain=True).splitlines())
-        return tuple(filter(None, found))
+        lines = map(str.strip, self.block(name, plain=True).splitlines())
+        return tuple(filter(None, lines))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as a JSON-compatible dict."""
-        found = with_units(self, json.loads(self.model_dump_json()), self.units)
-        return {name: found.pop(name) for name in _FIRST} | found
+        fields = with_units(self, json.loads(self.model_dump_json()), self.units)
+        return {name: fields.pop(name) for name in _FIRST} | fields
 
     def to_json(self) -> str:
         """Return the result as the text of a JSON file."""
@@ -155,14 +146,7 @@ class Result(Item):
         return {name: replace(chart, failed=failed) for name, chart in made}
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the first panel of the first chart.
-
-        Args:
-            ax: axes; by default new ones of pyplot.
-
-        Raises:
-            NotImplementedError: the result has no chart.
-        """
+        """Draw the first panel of the first chart, by default on axes of pyplot."""
         from hdcal.report.charts.chart_drawing import draw_panel
 
         for chart in self.charts().values():
@@ -183,11 +167,7 @@ class Result(Item):
         return drawn(terminal_parts(self), width)
 
     def page(self, command: str = "") -> str:
-        """Return the result as an HTML page that needs no other file.
-
-        Args:
-            command: the command line that made the result.
-        """
+        """Return the result as an HTML page that needs no other file."""
         from hdcal.report.page import html_page
 
         return html_page(self, command)

@@ -26,14 +26,9 @@ def write_result(
 ) -> None:
     """Write a result folder, whole or not at all.
 
-    Args:
-        result: what to write.
-        target: where.
-        command: the command line that made the result.
-        answer: name of the JSON file.
-        figures: names of the charts that are written as files too; by default all.
-        tables: by the names of their CSV files.
-        others: content of other files by name.
+    `answer` is the name of the JSON file, `figures` name the charts that are files too
+    (by default all), `tables` are by the names of their CSV files, `others` make the
+    content of other files.
     """
     contents = {answer: result.to_json().encode()}
     contents |= page_files(result, command, figures)

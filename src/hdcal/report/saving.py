@@ -21,21 +21,16 @@ MARKER = "hdcal-result.json"
 
 @dataclass
 class Target:
-    """Output folder or file, locked by this process until the context exits.
+    """Output folder or file, locked until the context exits.
 
-    Attributes:
-        name: as given by the user; symbolic links are resolved.
-        force: whether an older result may be replaced.
-        option: the parameter that sets `force`.
-        beginning: first bytes of a file that may be replaced; None for a folder.
-
-    Raises:
-        InputError: the target exists, is in use or cannot be written.
+    `InputError` if it exists, is in use or cannot be written.
     """
 
     name: str
+    # Whether an older result may be replaced, and the parameter that allows it.
     force: bool = False
     option: str = "force"
+    # First bytes of a file that may be replaced; None for a folder.
     beginning: bytes | None = None
 
     def __post_init__(self) -> None:
@@ -78,9 +73,7 @@ class Target:
     def filled(self) -> Iterator[Path]:
         """Path of an empty folder, or of a new file, that is renamed at the end.
 
-        Raises:
-            InputError: the target was created or edited; the new result is beside it.
-            NotWritable: writing failed.
+        Beside the target, if that was created or edited: `InputError`.
         """
         try:
             if self.beginning is None:
@@ -135,10 +128,10 @@ class Target:
 
 def _contents(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of each file, or "link" or "folder", by relative path."""
-    found = {}
+    contents = {}
     for path in sorted(folder.rglob("*")):
         content = "link" if path.is_symlink() else "folder"
         if path.is_file() and content != "link":
             content = hashlib.sha256(path.read_bytes()).hexdigest()
-        found[path.relative_to(folder).as_posix()] = content
-    return found
+        contents[path.relative_to(folder).as_posix()] = content
+    return contents

@@ -9,7 +9,7 @@ body is for the page).
 
 import re
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -25,13 +25,9 @@ _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 def rendered(
     template: str, block: str, values: Mapping[str, Any], *, plain: bool = False
 ) -> str:
-    """Return a block of a template; an empty text if there is none.
+    """Return a block of a template, given by its path in the package; empty if none.
 
-    Args:
-        template: its path inside the package.
-        block: name of the block.
-        values: variables; their texts may come from files.
-        plain: without the escapes of Markdown.
+    A plain text has no escapes of Markdown. Texts of variables may come from files.
     """
     page = _environment(plain).get_template(template)
     context = page.new_context(dict(values))
@@ -52,37 +48,33 @@ def _environment(plain: bool) -> Environment:
     environment = Environment(
         loader=PackageLoader("hdcal", ""),
         autoescape=True,
-        finalize=_printable if plain else _escaped,
+        finalize=partial(_shown, plain=plain),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
-        "capital": capital,
-        "code": code,
-        "hypothesis": hypothesis,
-        "label": label,
-        "median": median,
-        "load": load,
-        "number": number,
-        "percent": percent,
-        "span": span,
-        "unit": unit,
-    }
+    filters = (
+        capital,
+        code,
+        hypothesis,
+        label,
+        load,
+        median,
+        number,
+        percent,
+        span,
+        unit,
+    )
+    environment.filters |= {function.__name__: function for function in filters}
     return environment
 
 
-def _printable(value: Any) -> Any:
+def _shown(value: Any, *, plain: bool) -> Any:
+    """Return a text whose characters Markdown, unless plain, shows as they are."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
-    return Markup(printable(value))
-
-
-def _escaped(value: Any) -> Any:
-    """Return a text whose characters Markdown shows as they are."""
-    if not isinstance(value, str) or isinstance(value, Markup):
-        return value
-    return Markup(_PUNCTUATION.sub(r"\\\1", printable(value)))
+    text = printable(value)
+    return Markup(text if plain else _PUNCTUATION.sub(r"\\\1", text))
 
 
 def code(text: str) -> Markup:

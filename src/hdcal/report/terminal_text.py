@@ -73,12 +73,7 @@ class _Markdown(Markdown):
 def terminal_parts(
     result: "Result", folder: str | None = None
 ) -> Iterator[RenderableType]:
-    """Yield what a terminal prints of a result.
-
-    Args:
-        result: what to print.
-        folder: where the result was written, or None.
-    """
+    """Yield what a terminal prints of a result, and where it was written, if it was."""
     yield Text(f"{result.line('title')}: {result.line('subtitle')}", "bold")
     if result.reasons:
         yield Text("FAILED: this result must not be used.", "bold red")

@@ -73,11 +73,6 @@ def unit(name: str) -> str:
     return {"1": "", "degC": "°C", "C": "°C"}.get(name, name)
 
 
-def with_unit(text: str, name: str) -> str:
-    """Return a number's text followed by its unit."""
-    return f"{text} {unit(name)}".rstrip()
-
-
 def prior_words(name: str, prior: Prior, units: Quantities = FORCE) -> str:
     """Return a prior in words, in the units of the summary."""
     shown, factor = UNITS.get(name, (prior.unit, 1.0))
@@ -86,7 +81,8 @@ def prior_words(name: str, prior: Prior, units: Quantities = FORCE) -> str:
         plain = float(value) * (1.0 if part in _DIMENSIONLESS else factor)
         log = part == "log_sd"
         texts.append(f"{math.exp(plain):.3g}" if log else f"{plain:.4g}")
-    return with_unit(_FAMILY_WORDS[prior.family].format(*texts), units.unit(shown))
+    words = _FAMILY_WORDS[prior.family].format(*texts)
+    return f"{words} {unit(units.unit(shown))}".rstrip()
 
 
 def label(name: str, theory: str = "", units: Quantities = FORCE) -> str:

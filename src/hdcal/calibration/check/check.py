@@ -111,8 +111,8 @@ class Screened(Item):
 class CaseCheck(Result):
     """What was read of a case.
 
-    There is no screening of rows that are not those of a file. `implausible_K` is the
-    slope of the readings as K, with the ends of its prior, if it lies outside.
+    `implausible_K` is the slope of the readings as K, with the ends of its prior, if it
+    lies outside.
     """
 
     template = "calibration/check/report.md.j2"
@@ -145,11 +145,6 @@ class CaseCheck(Result):
         kept = SEGMENTS[LOADING : HOLDING + 1]
         found = self.screening.segments if self.screening else {}
         return {name: rows for name, rows in found.items() if name not in kept}
-
-    @property
-    def straight_part(self) -> StraightRange | None:
-        """The longest straight part of a single run."""
-        return self.screening.straight_part if self.screening else None
 
     @property
     def takes_part(self) -> bool:

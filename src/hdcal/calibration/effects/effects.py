@@ -49,11 +49,11 @@ def effects() -> Effects:
     """Return every effect of the library with its parameters."""
     priors, listed = effect_priors(), []
     for name, effect in EFFECTS.items():
-        found = []
+        rows = []
         for field, spec in parameters(effect).items():
             site = f"{name}.{field}"
             prior = priors.get(site)
-            one = ListedParameter(
+            row = ListedParameter(
                 name=field,
                 unit=spec.unit,
                 meaning=spec.meaning,
@@ -61,14 +61,14 @@ def effects() -> Effects:
                 prior=prior_words(site, prior) if prior else None,
                 source=prior.source if prior else None,
             )
-            found.append(one)
-        one = ListedEffect(
+            rows.append(row)
+        listed_effect = ListedEffect(
             name=name,
             stage=effect.stage,
             family=effect.family,
             needs=tuple(sorted(effect.needs)),
             meaning=(effect.__doc__ or "").strip().split("\n")[0],
-            parameters=tuple(found),
+            parameters=tuple(rows),
         )
-        listed.append(one)
+        listed.append(listed_effect)
     return Effects(effects=tuple(listed))

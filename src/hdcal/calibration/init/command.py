@@ -1,62 +1,53 @@
-"""`hdcal init`: ask for what a gear file needs, and write a case folder."""
+"""`hdcal init`: write a case folder from the sizes of a gear."""
 
 import os
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import column_option, json_option, sheet_option
+from hdcal.cli.options import column_option, combined, json_option, sheet_option
 from hdcal.data.theory_names import READINGS
 from hdcal.errors import Finding, InputError
 
-# Parameter -> its key in the gear file, its option, what is asked, the usual answer.
-_ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
-    "wall_thickness": ("wall_thickness_mm", "--wall", "Wall thickness [mm]", None),
-    "radius": ("radius_mm", "--radius", "Radius to the middle of the wall [mm]", None),
-    "length": ("length_mm", "--length", "Length of the gear [mm]", None),
-    "material": ("material", "--material", "Material", "steel"),
-    "reading": (
-        "deformation",
-        "--deformation",
-        "Deformation as read, radial or diametral",
-        None,
-    ),
-    "reference_temperature": (
-        "reference_temperature_C",
-        "--temperature",
-        "Reference temperature [°C]",
-        20.0,
-    ),
-}
-_KIND = dict.fromkeys(_ASKED, click.FLOAT) | {
-    "material": click.STRING,
-    "reading": click.Choice(READINGS),
-}
-
-
-def _asked(command):
-    for name, (_, option, words, default) in reversed(_ASKED.items()):
-        usual = "" if default is None else f" [default: {default}]"
-        add = click.option(option, name, type=_KIND[name], help=f"{words}{usual}.")
-        command = add(command)
-    return command
+# Named as the keys of the gear file.
+_sizes = combined(
+    *(
+        click.option(option, key, type=float, required=True, help=f"{words} [mm].")
+        for option, key, words in (
+            ("--wall", "wall_thickness_mm", "Wall thickness"),
+            ("--radius", "radius_mm", "Radius to the middle of the wall"),
+            ("--length", "length_mm", "Length of the gear"),
+        )
+    )
+)
 
 
 @command(short_help="Write a case folder from the sizes of a gear.")
 @click.argument("folder", metavar="FOLDER")
-@_asked
+@_sizes
+@click.option("--material", default="steel", show_default=True, help="Material.")
+@click.option(
+    "--deformation",
+    required=True,
+    type=click.Choice(READINGS),
+    help="Deformation as read, radial or diametral.",
+)
+@click.option(
+    "--temperature",
+    "reference_temperature_C",
+    default=20.0,
+    show_default=True,
+    help="Reference temperature [°C].",
+)
 @click.option("--data", metavar="FILE", help="Copy these readings to FOLDER/data.csv.")
 @column_option
 @sheet_option
 @json_option
 @click.pass_obj
-def init(console: Console, folder, data, columns, sheet, **given):
-    """Write FOLDER with a gear file, from options or answers to questions."""
-    stated = dict(_answers(given))
+def init(console: Console, folder, data, columns, sheet, **stated):
+    """Write FOLDER with a gear file, and with readings where there are any."""
     from hdcal.data.gear import read_gear
     from hdcal.data.gear_file.toml_file import gear_text
     from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME
@@ -99,36 +90,8 @@ def init(console: Console, folder, data, columns, sheet, **given):
     return 0
 
 
-def _answers(given: dict) -> Iterator[tuple[str, str | float]]:
-    """Yield what is stated, asking for what is not on a terminal.
-
-    Raises:
-        InputError: something has no usual answer, and nobody can be asked.
-    """
-    terminal = sys.stdin is not None and sys.stdin.isatty()
-    missing = [
-        Finding(option, "is not stated", "State it, or call hdcal from a terminal")
-        for name, (_, option, _, default) in _ASKED.items()
-        if given[name] is None and default is None and not terminal
-    ]
-    if missing:
-        raise InputError(missing)
-    for name, (key, _, words, default) in _ASKED.items():
-        if given[name] is not None:
-            yield key, given[name]
-        elif not terminal:
-            assert default is not None
-            yield key, default
-        else:
-            yield key, click.prompt(words, default=default, type=_KIND[name], err=True)
-
-
 def _write(folder: Path, files: dict[str, bytes]) -> None:
-    """Write files into a folder that may be there already; none of theirs is replaced.
-
-    Raises:
-        InputError: one of them is there already, or cannot be written.
-    """
+    """Write new files into a folder that may be there already."""
     if there := [name for name in files if (folder / name).exists()]:
         words = f"holds {' and '.join(there)} already"
         raise InputError([Finding(str(folder), words, "Name another folder")])

@@ -108,16 +108,16 @@ def force_log_likelihood(
     columns = discrepancy_columns(problem.discrepancy, padded)
     before = np.full(len(padded.force), -1)
     before[:rows] = previous_rows(case.records)
-    each = _pointwise(problem, draws.values, padded, columns, before)
-    return {"force": np.asarray(each)[..., :rows]}
+    pointwise = _pointwise(problem, draws.values, padded, columns, before)
+    return {"force": np.asarray(pointwise)[..., :rows]}
 
 
 @jax.jit
 def _pointwise(problem, values, records, columns, before):
-    def one(value):
-        return pointwise_log_likelihood(problem, value, records, columns, before)
+    def log_likelihood(draw):
+        return pointwise_log_likelihood(problem, draw, records, columns, before)
 
-    return jax.vmap(jax.vmap(one))(values)
+    return jax.vmap(jax.vmap(log_likelihood))(values)
 
 
 def run_settings(draws: Draws, began: float) -> dict[str, object]:

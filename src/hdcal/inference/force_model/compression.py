@@ -16,25 +16,17 @@ from hdcal.data.records import Array, Records
 
 
 class CompressedRows(eqx.Module):
-    """Triangular factors, one for each run on each specimen.
+    """Triangular factors and numbers of rows, for each run on each specimen."""
 
-    Attributes:
-        factor: R of [X y]; before `whitened`, of rows that follow no other one.
-        count: number of rows [-].
-        run: run index.
-        specimen: specimen index.
-        known_sd: stated measurement sd of all rows [N].
-        pairs: R of [X y X' y'] with X' and y' of the row before, or None where
-            neighbours are not correlated.
-        following: number of rows that follow another one [-].
-    """
-
+    # R of [X y]; before `whitened`, of rows that follow no other one.
     factor: Float[Array, "g r p"]
     count: Float[Array, " g"]
     run: Int[Array, " g"]
     specimen: Int[Array, " g"]
     known_sd: Float[Array, ""] | float
+    # R of [X y X' y'] with X' and y' of the row before; None without correlation.
     pairs: Float[Array, "g q q"] | None
+    # Number of rows that follow another one.
     following: Float[Array, " g"]
 
     def whitened(self, correlation) -> "CompressedRows":

@@ -31,21 +31,16 @@ _DIRECTION = {"unloading", "rates"}
 
 
 class Discrepancy(eqx.Module):
-    """Smooth functions of deformation, orthogonal to offset and slope at tested rows.
+    """Functions of deformation, orthogonal to offset and slope at the tested rows."""
 
-    Attributes:
-        centre: middle of the tested deformation [mm].
-        half_range: half the tested range [mm].
-        absorbed: offset and slope in each function, the half loop's last.
-        directed: whether there are functions for half a loop.
-        loop: factor of the half loop: 0 where an effect draws loops itself.
-    """
-
+    # Of the tested deformation [mm].
     centre: float
     half_range: float
+    # Offset and slope in each function, those of half a loop last.
     absorbed: Float[Array, "2 m"]
     directed: bool = eqx.field(static=True, default=False)
-    # A size that does not depend on the effects: draws of several models are joined.
+    # Factor of the half loop, 0 where an effect draws loops itself: the size does not
+    # depend on the effects, as draws of several models are joined.
     loop: float = 1.0
 
     @property
@@ -93,8 +88,7 @@ def build_discrepancy(
 ) -> Discrepancy:
     """Project the functions off an offset and a slope at the tested rows.
 
-    Half a loop is left out where the force of an effect depends on the direction of
-    the movement, from which it could not be distinguished.
+    Half a loop is left out beside an effect that depends on the direction of movement.
     """
     deformation = np.asarray(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))

@@ -28,18 +28,14 @@ _SHARE = 0.3
 
 @dataclass(frozen=True)
 class Linearisation:
-    """The mean reading near one set of parameters, row by row.
+    """The mean reading near one set of parameters, row by row."""
 
-    Attributes:
-        sd: of the noise, rounding included [N], shape (n,).
-        slopes: derivatives by parameter [N per unit of the parameter], shape (n,).
-        members: contribution of each run, specimen and weight of the discrepancy per
-            prior sd [N], shape (n, m).
-        place: values of the members, in prior sds, shape (m,).
-    """
-
+    # Of the noise, rounding included [N], (n,).
     sd: np.ndarray
+    # Derivatives by parameter [N per unit of the parameter], (n,) each.
     slopes: dict[str, np.ndarray]
+    # Of runs, specimens and weights of the discrepancy: the contribution of each per
+    # prior sd [N], (n, m), and its value in prior sds, (m,).
     members: np.ndarray
     place: np.ndarray
 
@@ -130,9 +126,9 @@ def identification_checks(
         if set(names) == {"K", "E0"}:
             words = "their product can, and with the prior of E0 that determines K"
         flat.append(f"{listed(names)} cannot be distinguished by these data; {words}")
-    found = [Check(apart, "note", words) for words in flat]
+    flat_notes = [Check(apart, "note", words) for words in flat]
     none = Check(apart, "passed", "no direction is left to the priors")
-    return *notes, *(found or [none])
+    return *notes, *(flat_notes or [none])
 
 
 def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:

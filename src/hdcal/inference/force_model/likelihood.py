@@ -47,13 +47,8 @@ def log_interval(low, high):
 def log_probability(force, mean, noise: Noise, step, *, rounded: bool):
     """Return the log probability of each reading [log 1/N], shape (n,).
 
-    Args:
-        force: as read [N].
-        mean: expected reading [N].
-        noise: mixture of normals before rounding [N].
-        step: rounding step q of the reading [N].
-        rounded: whether a reading y stands for the interval y ± q/2, whose probability
-            is divided by q, or for the number itself.
+    The noise is a mixture of normals before rounding. Where `rounded`, a reading y
+    stands for the interval y ± step/2, whose probability is divided by the step.
     """
     error = (force - mean) / noise.sd
     if rounded:
@@ -92,10 +87,7 @@ def pointwise_log_likelihood(
 
 @singledispatch
 def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
-    """Return the log likelihood of all data, members integrated out where they can.
-
-    Padding is left out.
-    """
+    """Return the log likelihood of the measured rows, members integrated out if any."""
     raise NotImplementedError(type(problem).__name__)
 
 

@@ -1,9 +1,8 @@
 """Runs, specimens and the discrepancy, integrated out exactly.
 
 Given the shared parameters they are normal a priori and enter a Gaussian likelihood
-linearly. Sampled together with their scale they make funnels, in which a sampler can be
-wrong without a warning. In noise sds the residual is r = Z w + e with standard normal
-scores w. With A = I + Z'Z and u = Z'r:
+linearly; sampled with their scale they make funnels. In noise sds the residual is
+r = Z w + e with standard normal scores w. With A = I + Z'Z and u = Z'r:
 
     log p(r) = −½ [log|A| + r'r − u'A⁻¹u] + constant,   w = A⁻¹u + A^(−½) ξ.
 """

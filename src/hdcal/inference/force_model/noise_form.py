@@ -30,15 +30,11 @@ _stop_cells = jit(stop_cells)
 
 
 class BaseForces(NamedTuple):
-    """A linear model of the force, fitted by least squares.
+    """A linear model of the force, fitted by least squares."""
 
-    Attributes:
-        columns: orthonormal, shape (n, p).
-        force: of each row, less the means or lines that have no column [N].
-        taken: number of these.
-    """
-
+    # Orthonormal, (n, p).
     columns: np.ndarray
+    # Less the means or lines that have no column [N], and the number of these.
     force: np.ndarray
     taken: int
 
@@ -58,12 +54,9 @@ class BaseForces(NamedTuple):
 def base_model(records: Records, shapes: str = "line") -> BaseForces:
     """Return the model of a line for each specimen with a zero for each run.
 
-    Args:
-        records: the rows.
-        shapes: `line`; `bend` also has a cubic, a step for the direction and a drift
-            with the temperature, which stand for effects; `loop` in addition a loop of
-            any shape, as of joints that stick and slip, and one that opens with the
-            load.
+    `shapes` is `line`; `bend` also has a cubic, a step for the direction and a drift
+    with the temperature, which stand for effects; `loop` in addition a loop of any
+    shape, as of joints that stick and slip, and one that opens with the load.
     """
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
     force, deformation = (
@@ -84,7 +77,7 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
         loop = [sense * np.abs(scaled), sense * scaled**2]
         columns += [*loop, *loop_cells(records, _REACHES)]
     if len(specimens) > _MOST_COLUMNS:
-        *columns, force = (left_of_lines(records, one) for one in (*columns, force))
+        *columns, force = (left_of_lines(records, v) for v in (*columns, force))
         taken = len(specimens) + len(runs)
     else:
         # Lines through the origin: several specimens in one run share a zero.

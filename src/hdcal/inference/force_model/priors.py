@@ -16,11 +16,7 @@ SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
 
 
 def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Return the effects that have sites.
-
-    Effects of scatter have none: wherever there are two runs or specimens these are
-    members of the model, with the priors `run_offset_sd` and `specimen_sd`.
-    """
+    """Return the effects that have sites: runs and specimens scatter as members."""
     return tuple(effect for effect in effects if not issubclass(effect, Scatter))
 
 
@@ -32,10 +28,7 @@ def problem_priors(
 ) -> dict[str, Prior]:
     """Return the priors of every site, K carried over to the theory in use.
 
-    What the gear file states replaces what is shipped for effects.
-
-    Raises:
-        InputError: an effect's parameter has no prior.
+    What the gear file states replaces what is shipped. `InputError` if one is missing.
     """
     gear = case.gear
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
@@ -61,8 +54,7 @@ def problem_priors(
 def influence_prior(case: Case, theory: Theory) -> Prior:
     """Return the prior of K carried over to a theory: K_a k_a = K_b k_b.
 
-    Raises:
-        InputError: one theory is `spring`, which has another modulus.
+    `InputError` if one of both is `spring`, which has another modulus.
     """
     gear = case.gear
     if (theory == SPRING) != (gear.K_theory == SPRING):

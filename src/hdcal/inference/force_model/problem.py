@@ -48,45 +48,36 @@ _base_columns = jit(linear_columns)
 class Problem(Sampled):
     """The force model of one case; only arrays change between data sets of one shape.
 
-    Attributes:
-        priors: by site name, in code units; K under the theory of the problem.
-        unit_stiffness: k_theory/E, radial [mm].
-        reading: how the rig reads.
-        records: all rows, padded, or None when they are compressed.
-        blocks: compressed rows, or None.
-        columns: basis of the discrepancy at the padded rows, or None.
-        discrepancy: the leftover discrepancy, or None.
-        step: rounding step [N], 0 = none.
-        centre: middle of the deformations as read [mm].
-        count: measured rows; `records` and `columns` have padding after them.
-        before: index of the row before each padded row in its run, −1 for none; or
-            None where neighbours are not correlated or rows are compressed.
-        effects: effect classes in the model, those of scatter left out.
-        rounded: exact rounding likelihood (else Sheppard's correction).
-        runs: number of runs with a zero each, 0 = none.
-        specimens: number of specimens with a stiffness each, 0 = none.
-        integrated: kinds of members that are integrated out.
-        correlated: whether neighbouring readings of a run may be correlated.
-        zero_stated: whether a certificate states the zero of the force gauge.
+    Rows are compressed to `blocks`, or padded: `count` of them were measured.
     """
 
+    # In code units, K under the theory of the problem.
     priors: dict[str, Prior]
+    # k_theory/E, radial [mm].
     unit_stiffness: Float[Array, ""] | float
     reading: Reading
     records: Records | None
     blocks: CompressedRows | None
+    # Basis of the discrepancy at the padded rows.
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
+    # Of rounding [N], 0 for none.
     step: Float[Array, ""] | float
+    # Middle of the deformations as read [mm].
     centre: Float[Array, ""] | float
     count: int
+    # From `previous_rows`, if neighbours are correlated.
     before: Int[Array, " n"] | None
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
+    # Exact likelihood of rounded readings, else Sheppard's correction.
     rounded: bool = eqx.field(static=True)
+    # Number of runs with a zero each and of specimens with a stiffness each, or 0.
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
+    # Kinds of members that are integrated out.
     integrated: tuple[str, ...] = eqx.field(static=True)
     correlated: bool = eqx.field(static=True)
+    # Whether a certificate states the zero of the force gauge.
     zero_stated: bool = eqx.field(static=True)
 
     @property
@@ -109,7 +100,7 @@ class Problem(Sampled):
         return {**self.priors, "force_offset": zero}
 
     def declare(self) -> None:
-        """Declare the joint density of parameters and data to NumPyro."""
+        """Declare the joint density."""
         # Late: it imports this module.
         from hdcal.inference.force_model.model import declare
 
@@ -141,9 +132,7 @@ def build_problem(
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
     Theory and structure are by default the gear's and that which the readings show.
-
-    Raises:
-        InputError: an effect lacks its covariates or a prior.
+    `InputError` if an effect lacks its covariates or a prior.
     """
     records, reading = case.records, case_reading(case)
     members = {

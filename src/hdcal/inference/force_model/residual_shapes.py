@@ -23,35 +23,24 @@ Shapes = dict[str, tuple[np.ndarray, str, str]]
 
 @dataclass(frozen=True)
 class Structure:
-    """One shape that noise would rarely have.
-
-    Attributes:
-        name: what the residuals depend on.
-        p_value: of the t test, adjusted for the number of shapes tried.
-        size_N: root mean square of the shape.
-        words: one sentence.
-        coefficient: of the shape's column [N], with its standard error; else NaN.
-    """
+    """One shape that noise would rarely have, with a p value for all shapes tried."""
 
     name: str
     p_value: float
+    # Root mean square.
     size_N: float
     words: str
+    # Of the shape's column [N], with its standard error.
     coefficient: float = np.nan
     error: float = np.nan
 
 
 @dataclass(frozen=True)
 class Whitened:
-    """Residuals and what could explain them, in noise sds.
+    """Residuals (n + p,), sensitivities (n + p, q) and shapes (n + p,), in noise sds.
 
     Below the rows of the data is one row for each parameter with its prior, so that
     the fit absorbs a shape only as far as the priors let it.
-
-    Attributes:
-        residual: shape (n + p,).
-        absorbed: sensitivity to each parameter, shape (n + p, q).
-        shapes: candidates, each column of shape (n + p,).
     """
 
     residual: np.ndarray
@@ -86,12 +75,8 @@ def shapes_of(
 ) -> Shapes:
     """Return the shapes to look for in the residuals of these records.
 
-    Args:
-        records: of the calibration.
-        reference_temperature: of the gear [°C].
-        smoothed: whether scatter was taken out of the deformation by smoothing it over
-            the rows. What the deformation leaves of the rows' order and time is then
-            the smoothed scatter, which is in the residuals too.
+    Where scatter was smoothed out of the deformation, residuals hold it: what the
+    deformation leaves of the rows' order and time is then no shape.
     """
     scaled = records.deformation / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - reference_temperature
@@ -138,13 +123,8 @@ def find_structure(
 
     The clearest shape is taken first; the others are then tested on what it leaves,
     each at a family-wise error of `FALSE_ALARM`: Bonferroni over the shapes still
-    tried, in all searches. Coefficients are those of all found shapes together.
-
-    Args:
-        data: residuals, sensitivities and shapes.
-        sd: noise sd of each row [N].
-        noise: how neighbours may be correlated, if they may.
-        looks: number of searches for the same shapes.
+    tried, in all `looks` at them. Coefficients are those of all found shapes together.
+    The noise sd of each row is in N.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed
     structures: list[Structure] = []
@@ -164,13 +144,13 @@ def find_structure(
         words = f"The residuals {way} ({rms:.2g} {{N}} rms)."
         structures.append(Structure(best.name, p, rms, words, *best.size(column)))
         absorbed = np.column_stack([absorbed, column])
-    for place, one in enumerate(structures if len(structures) > 1 else ()):
-        others = [data.shapes[each.name][0] for each in structures if each is not one]
+    for place, shape in enumerate(structures if len(structures) > 1 else ()):
+        others = [data.shapes[s.name][0] for s in structures if s is not shape]
         basis = orthonormal(np.column_stack([data.absorbed, *others]))
-        column = data.shapes[one.name][0]
-        for test in _tests(data.residual, {one.name: column}, basis, noise):
+        column = data.shapes[shape.name][0]
+        for test in _tests(data.residual, {shape.name: column}, basis, noise):
             size, error = test.size(column)
-            structures[place] = replace(one, coefficient=size, error=error)
+            structures[place] = replace(shape, coefficient=size, error=error)
     return tuple(structures)
 
 
@@ -222,8 +202,8 @@ def _tests(
         sd = np.sqrt(error / (free * square))
         t = np.abs(cross) / (square * sd)
         p, coefficient, sd = (
-            float(chance @ each)
-            for each in (2.0 * special.stdtr(free, -t), cross / square, sd)
+            float(chance @ given_rho)
+            for given_rho in (2.0 * special.stdtr(free, -t), cross / square, sd)
         )
         tests.append(_Test(name, p, coefficient, sd, unit))
     return tests

@@ -49,20 +49,13 @@ _WILD, _SHARE, _FEW = 12.0, 0.02, 3
 
 @dataclass(frozen=True)
 class Residuals:
-    """Measured less fitted, row by row; the fit is the posterior mean reading.
-
-    Attributes:
-        records: the rows.
-        residual: measured − fitted [N].
-        standardised: residual over the noise sd [-].
-        structure: shapes that noise would rarely show.
-        noise: in which ways the rest is not the noise that the model has.
-        units: names and units of what was measured.
-    """
+    """Measured less fitted, row by row; the fit is the posterior mean reading."""
 
     records: Records
+    # In N, and in sds of the noise.
     residual: np.ndarray
     standardised: np.ndarray
+    # Shapes that noise would rarely show, and how the rest differs from the model's.
     structure: tuple[Structure, ...]
     noise: tuple[Structure, ...]
     units: Quantities
@@ -158,23 +151,20 @@ def noise_faults(
 ) -> tuple[Structure, ...]:
     """Return how residuals differ from the noise that the model has.
 
-    The family-wise error of the tests is `FALSE_ALARM`.
-
-    Args:
-        data: residuals and what was absorbed, shapes that were found included.
-        records: the rows.
-        sd: noise sd of each row [N].
-        rounded: whether steps of the reading are wider than its noise; neighbours
-            then err in the same way without any correlation.
-        mixed: whether the model expects wild readings.
-        correlation: of neighbouring readings in the model [-].
+    The family-wise error of the tests is `FALSE_ALARM`. `data` absorbs the shapes that
+    were found; the noise sd of each row is in N. Where steps of the reading are wider
+    than its noise (`rounded`), neighbours err in the same way without any correlation;
+    a model that is `mixed` expects wild readings.
     """
     if len(sd) < _LEAST_ROWS:
         return ()
     before = previous_rows(records)
     # Squares of correlated errors come in waves, which pass for growth.
     left = _independent(data, before, correlation)
-    tests = [_scatter(left, records, sd)]
+    rms = float(np.sqrt(np.mean((left.scaled * sd) ** 2)))
+    words = "Readings scatter more at larger {load}s: bounds there are too low."
+    p_value = growth_p_value(left.scaled**2, records.deformation)
+    tests = [Structure(SCATTER, p_value, rms, words)]
     if not (rounded or mixed):
         added = sd * np.sqrt(1.0 - correlation**2 * (before >= 0))
         tests.append(_wild(left, records, added))
@@ -185,18 +175,15 @@ def noise_faults(
 
 
 class _Left(NamedTuple):
-    """Independent residuals less all that was absorbed, in noise sds.
+    """Independent residuals less all that was absorbed, in noise sds."""
 
-    Attributes:
-        basis: orthonormal columns of all that was absorbed, (n + p, q).
-        error: with the rows of the priors below those of the data, (n + p,).
-        scaled: errors of the data's rows, of unit variance each, (n,).
-        free: degrees of freedom.
-    """
-
+    # Orthonormal columns of all that was absorbed, (n + p, q).
     basis: np.ndarray
+    # With the rows of the priors below those of the data, (n + p,).
     error: np.ndarray
+    # Of the data's rows, of unit variance each, (n,).
     scaled: np.ndarray
+    # Degrees of freedom.
     free: int
 
 
@@ -274,19 +261,3 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
         "here may be off."
     )
     return Structure(WILD, float(chance[row]) if is_wild else 1.0, off, words)
-
-
-def _scatter(left: _Left, records: Records, sd: np.ndarray) -> Structure:
-    """Test whether readings scatter more the farther the gear is deformed."""
-    far, square = np.abs(np.asarray(records.deformation)), left.scaled**2
-    thirds = np.quantile(far, [1 / 3, 2 / 3])
-    near, farther = (
-        float(np.sqrt(np.mean(square[rows] * sd[rows] ** 2)))
-        for rows in (far <= thirds[0], far >= thirds[1])
-    )
-    words = (
-        f"Readings scatter more at larger {{load}}s ({near:.2g} {{N}} in the "
-        f"lower third, {farther:.2g} {{N}} in the upper one): bounds at large "
-        "{load}s are too low."
-    )
-    return Structure(SCATTER, growth_p_value(square, far), farther - near, words)

@@ -30,12 +30,9 @@ def previous_rows(records: Records) -> Int[np.ndarray, " n"]:
 
 
 def whiten(columns, before, correlation):
-    """Return columns of rows in which the noise is independent.
+    """Return columns of rows, in noise sds, in which the noise is independent.
 
-    Args:
-        columns: in noise sds, rows along the first axis; arrays of NumPy or JAX.
-        before: from `previous_rows`.
-        correlation: ρ, between −1 and 1.
+    Rows are along the first axis; `before` is from `previous_rows`.
     """
     follows = (before >= 0).reshape(-1, *(1,) * (columns.ndim - 1))
     gain = (1.0 - correlation**2) ** -0.5
@@ -54,11 +51,8 @@ def whitened_products(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return inner products of whitened columns (r, p, p), and log |dz/de| (r,).
 
-    Args:
-        table: columns in noise sds, shape (m, p); rows after those of the data are
-            independent.
-        before: from `previous_rows`, shape (n,).
-        correlation: each ρ, shape (r,).
+    The table (m, p) is in noise sds, its rows after the n of `before` independent; the
+    correlation is each ρ, (r,).
     """
     (follows,) = np.nonzero(before >= 0)
     now, earlier = table[follows], table[before[follows]]

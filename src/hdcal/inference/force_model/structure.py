@@ -50,17 +50,11 @@ _SIZES = np.logspace(-0.5, 3.0, 8)
 
 @dataclass(frozen=True)
 class ModelStructure:
-    """Form of a model apart from its effects.
+    """Form of a model apart from its effects."""
 
-    Attributes:
-        noise_sd: left by a pilot fit [N].
-        rounded: whether the noise needs the exact likelihood of rounded readings.
-        with_gap: whether the leftover discrepancy is in the model.
-        correlated: whether the correlation of neighbouring readings is in the model.
-        why_independent: why it is not; empty where it is.
-    """
-
+    # Left by a pilot fit [N].
     noise_sd: float
+    # Whether the noise needs the exact likelihood of rounded readings.
     rounded: bool
     with_gap: bool
     correlated: bool
@@ -146,7 +140,7 @@ def _best_form(
         shapes = np.asarray(discrepancy_columns(gap, pad_records(records)))
         others = np.column_stack([shapes[: len(others)], others])
         lengths = quantiles(priors["gap_length"], _LENGTHS, "gap_length")
-        scales = [np.asarray(gap.prior_sd(1.0, one)) for one in lengths]
+        scales = [np.asarray(gap.prior_sd(1.0, length)) for length in lengths]
     columns = base.columns
     table = np.hstack([columns, others - columns @ (columns.T @ others)])
     before, width = previous_rows(records), columns.shape[1]
@@ -154,12 +148,15 @@ def _best_form(
 
     def log_evidence(form: tuple[bool, bool]) -> float:
         products = whitened_products(table, before, rho if form[1] else np.zeros(1))
-        each = [
-            volume + one
+        chances = [
+            volume + chance
             for gram, volume in zip(*products, strict=True)
-            for one in _log_chances(gram, width, len(table), scales if form[0] else [])
+            for chance in _log_chances(
+                gram, width, len(table), scales if form[0] else []
+            )
         ]
-        return np.logaddexp.reduce(each) - np.log(len(each)) - sum(form) * _LOG_POSITIVE
+        mean = np.logaddexp.reduce(chances) - np.log(len(chances))
+        return mean - sum(form) * _LOG_POSITIVE
 
     return max(forms, key=log_evidence)
 

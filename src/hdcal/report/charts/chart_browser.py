@@ -49,7 +49,7 @@ class _Columns:
             "height": round(110 * panel.height) or (380 if panel.wide else 300),
             "wide": panel.wide,
             "limits": list(panel.y_limits),
-            "log": [panel.x_log, panel.y_log],
+            "log": [panel.x_log, False],
             "bands": self._bands,
             "errors": self._errors,
             "rules": self._rules,

@@ -82,21 +82,19 @@ def images(
     chart: Chart, title: str = "", kinds: Sequence[Kind] = ("svg", "png")
 ) -> dict[Kind, bytes]:
     """Return a chart as the content of files, by kind."""
-    figure = draw(chart)
-    return {kind: render(figure, kind, title) for kind in kinds}
-
-
-def render(figure: Figure, kind: Kind, title: str = "") -> bytes:
-    """Return a figure as the bytes of a file, which are reproducible."""
-    target = io.BytesIO()
-    metadata: dict[str, Any] = {"Title": printable(title)} if title else {}
-    if kind == "svg":
-        metadata["Date"] = None
-    with style(), warnings.catch_warnings():
-        # Characters without a glyph are drawn as boxes.
-        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
-    return target.getvalue()
+    figure, files = draw(chart), {}
+    for kind in kinds:
+        target = io.BytesIO()
+        metadata: dict[str, Any] = {"Title": printable(title)} if title else {}
+        if kind == "svg":
+            # Files are reproducible.
+            metadata["Date"] = None
+        with style(), warnings.catch_warnings():
+            # Characters without a glyph are drawn as boxes.
+            warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+            figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
+        files[kind] = target.getvalue()
+    return files
 
 
 def draw(chart: Chart) -> Figure:
@@ -130,7 +128,9 @@ def draw(chart: Chart) -> Figure:
                 axes.set_xlabel("")
             figure.supxlabel(_plain(chart.panels[-1].x), fontsize=10)
         if chart.failed:
-            _watermark(figure)
+            look: dict[str, Any] = {"fontsize": 44, "fontweight": "bold", "alpha": 0.35}
+            look |= {"ha": "center", "va": "center", "zorder": 100}
+            figure.text(0.5, 0.5, "FAILED — do not use", color=RED, **look)
     return figure
 
 
@@ -163,29 +163,10 @@ def _plain(text: str, length: int = 80) -> str:
     return shown.replace("$", r"\$")
 
 
-def _watermark(figure: Figure) -> None:
-    """Write across a figure that its result must not be used."""
-    figure.text(
-        0.5,
-        0.5,
-        "FAILED — do not use",
-        color=RED,
-        alpha=0.35,
-        fontsize=44,
-        fontweight="bold",
-        ha="center",
-        va="center",
-        zorder=100,
-    )
-
-
 def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
     """Draw a panel and return its axes.
 
-    Args:
-        panel: what to draw.
-        axes: where.
-        named: labels of other legends, to which those of this panel are added.
+    Labels in `named`, of other legends, are left out; those of this panel are added.
     """
     named = set() if named is None else named
     entries: dict[str, list[Any]] = {}
@@ -196,9 +177,8 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
             entries.setdefault(mark.label, []).extend(handles)
     x, y = ("y", "x") if panel.horizontal else ("x", "y")
     axes.set(**{f"{x}label": _plain(panel.x), f"{y}label": _plain(panel.y)})
-    for axis, log in ((x, panel.x_log), (y, panel.y_log)):
-        if log:
-            axes.set(**{f"{axis}scale": "log"})
+    if panel.x_log:
+        axes.set(**{f"{x}scale": "log"})
     if panel.y_limits != (None, None):
         axes.set(**{f"{y}lim": panel.y_limits})
     if panel.names:
@@ -211,11 +191,11 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
         axes.set_title(_plain(panel.title), loc="left", fontweight="bold", color=_DARK)
         # The common factor of the tick labels, to the left of the title.
         axes.yaxis.get_offset_text().set_horizontalalignment("right")
-    entries = {name: each for name, each in entries.items() if name not in named}
+    entries = {label: marks for label, marks in entries.items() if label not in named}
     named |= set(entries)
     if 0 < len(entries) <= _MOST_LEGENDS:
-        handles = [tuple(each) for each in entries.values()]
-        names = [_plain(name, _LONGEST_LEGEND) for name in entries]
+        handles = [tuple(marks) for marks in entries.values()]
+        names = [_plain(label, _LONGEST_LEGEND) for label in entries]
         look: dict[str, Any] = {"frameon": True, "framealpha": 0.8, "edgecolor": "none"}
         combined = {tuple: HandlerTuple(ndivide=1)}
         place: dict[str, Any] = {"loc": "best"}
@@ -232,7 +212,7 @@ def _name(axes: Axes, panel: Panel) -> None:
     names = [_plain(name, _LONGEST_NAME) for name in panel.names[::step]]
     if panel.horizontal:
         lines = [wrap(_plain(name, _LONGEST_LINES), _LINE) for name in panel.names]
-        axes.set_yticks(at, ["\n".join(each) for each in lines[::step]])
+        axes.set_yticks(at, ["\n".join(parts) for parts in lines[::step]])
         axes.set_ylim(len(panel.names) + 0.6, 0.4)
         axes.grid(False, axis="y")
         return

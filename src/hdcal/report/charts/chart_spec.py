@@ -95,33 +95,20 @@ Mark = Line | Points | Band | Bars | Rule | Span
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """Marks on two axes, drawn in their order.
+    """Marks on two axes, drawn in their order; a label has one entry of the legend.
 
-    Attributes:
-        x: label of the axis with its unit.
-        y: as x.
-        marks: those with the same label share an entry of the legend.
-        title: above the panel.
-        names: categories at 1, 2, … of the x axis.
-        horizontal: whether the axes are exchanged, so that long names have room.
-        y_limits: ends of the axis; None: by the marks.
-        x_log: whether the axis is logarithmic.
-        y_log: as x_log.
-        y_ticks: whether the y axis has a scale.
-        wide: whether the panel takes a whole row.
-        height: in inches; 0: by the marks.
-        legend_beside: whether the legend is outside the axes.
+    A wide panel takes a whole row. The height is in inches, 0: by the marks.
     """
 
     x: str
     y: str
     marks: Sequence[Mark]
     title: str = ""
+    # Categories at 1, 2, … of the x axis; horizontal bars leave room for long ones.
     names: Sequence[str] = ()
     horizontal: bool = False
     y_limits: tuple[float | None, float | None] = (None, None)
     x_log: bool = False
-    y_log: bool = False
     y_ticks: bool = True
     wide: bool = False
     height: float = 0.0
@@ -130,15 +117,9 @@ class Panel:
 
 @dataclass(frozen=True, kw_only=True)
 class Chart:
-    """Panels in rows.
+    """Panels in rows; those that are not wide may share axes.
 
-    Attributes:
-        panels: from left to right and from top to bottom.
-        columns: panels in a row.
-        share_x: whether panels that are not wide have the same x axis.
-        share_y: as share_x.
-        static: whether a page shows it as an image only.
-        failed: whether it is marked as a result that must not be used.
+    A page shows a static chart as an image; a failed one is marked.
     """
 
     panels: Sequence[Panel]
