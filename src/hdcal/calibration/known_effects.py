@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from hdcal.data.case import Case
-from hdcal.data.gear_file.toml_file import did_you_mean
+from hdcal.data.findings import did_you_mean
 from hdcal.errors import Finding, Findings
 from hdcal.inference.force_model.problem import MEMBER_SD
 from hdcal.physics.effect import Effect, parameters
