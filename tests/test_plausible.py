@@ -1,5 +1,6 @@
 """Every number that is given has a range, and is refused just outside it."""
 
+import re
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -189,7 +190,9 @@ def options(command: click.Command) -> Iterator[click.Parameter]:
 def test_every_option_that_takes_a_number_has_a_range():
     found = [*options(program)]
     assert len(found) > 35
-    assert all(range_of(str(option.name)).why for option in found)
+    # Sizes of a gear are named as keys of the gear file.
+    names = [re.sub("_(mm|C)$", "", str(option.name)) for option in found]
+    assert all(range_of(name).why for name in names)
 
 
 def test_what_is_no_number_or_no_table_is_refused():

@@ -155,5 +155,7 @@ def _compared(name, models, draws, apart, tolerance: float | None) -> Compared:
         probability_stiffer=float(np.mean(apart > 0.0) + np.mean(apart == 0.0) / 2.0),
         probability_differs=beyond,
         case=case,
-        has_leftover=any(model.problem.discrepancy is not None for model in models),
+        has_leftover=any(
+            model.posterior.problem.discrepancy is not None for model in models
+        ),
     )

@@ -3,13 +3,14 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
 
 from hdcal.data.findings import why_not_readable
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, NotUsable
 
 FILE_NAME = "posterior.nc"
 # Attributes that hold the format, and the digest of everything else.
@@ -47,16 +48,18 @@ def content(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, str]) -> byt
 
 
 def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
-    """Return the content of a posterior file; `InputError` if it cannot be used."""
+    """Return the content of a posterior file.
+
+    Raises:
+        InputError: it is missing, damaged, changed, or of another kind or version.
+        NotUsable: it belongs to a diagnosis that failed.
+    """
     if (why := why_not_readable(path, _LARGEST_FILE)) is not None:
         raise InputError([Finding(str(path), *why)])
     try:
         tree = xr.load_datatree(path, engine="h5netcdf")
     except FileNotFoundError as error:
-        remedy = "Name the folder of a calibration that did not fail"
-        raise InputError(
-            [Finding(str(path), "there is no such file", remedy)]
-        ) from error
+        raise _missing(path) from error
     # What h5py and xarray raise for a damaged file depends on the damage.
     except Exception as error:
         raise not_a_posterior(path, kind) from error
@@ -101,3 +104,13 @@ def _kind(written: object) -> Kind | None:
     name = str(written).rpartition("/")[0]
     kinds = CALIBRATION, FLEET
     return next((kind for kind in kinds if kind.format.startswith(f"{name}/")), None)
+
+
+def _missing(path: Path) -> InputError | NotUsable:
+    """Return the error for a file that is not there, as of a failed diagnosis."""
+    with suppress(OSError, ValueError):
+        verdict = json.loads((path.parent / "verdict.json").read_bytes())
+        if verdict.get("status") == "failed":
+            return NotUsable("this diagnosis failed and must not be used")
+    remedy = "Name the folder of a calibration, or of a diagnosis without --quick"
+    return InputError([Finding(str(path), "there is no such file", remedy)])

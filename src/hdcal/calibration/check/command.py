@@ -46,7 +46,7 @@ def _read(console: Console, given: dict[str, Any]) -> "Case | None":
     if is_case or not gear_files(given["data"]):
         return read_given(console, **given)
     console.wrong += without_meaning(["sheet"], "a folder of gears")
-    names = "data", "gear", "columns", "theory", "encoding", "range"
+    names = "data", "gear", "columns", "encoding", "range"
     how = {name: given[name] for name in names}
     found = console.wrong.attempt(read_gear_folder, **how)
     return None if found is None else found[0]
