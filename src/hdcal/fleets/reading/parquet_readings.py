@@ -27,6 +27,7 @@ from hdcal.fleets.reading.readings import (
 from hdcal.fleets.reading.record_faults import irregular
 from hdcal.screening.result import Observation
 from hdcal.screening.screen import screen
+from hdcal.screening.turning_points import TURN_MOST
 
 _LOST = "start again: reading takes a small part of the time"
 # First rows that are kept.
@@ -92,7 +93,7 @@ class BatchSums:
         each = each.assign(row=each.index)
         x, force, gear = read["deformation"], read["force"], self.source.gear
         warm = read.get("temperature", gear.reference_temperature)
-        sense = derive_motion(x, index, hidden=hidden).sense
+        sense = np.ones(len(x)) if hidden else senses(x, index)
         sense = sense_at_turns(sense, x, force, index)
         v = reading_vectors(x * modulus_left(gear, warm), sense, force)
         return each, index, v, RowSums.of(index, v, x)
@@ -163,6 +164,32 @@ class BatchSums:
         index = found.frame[self.keys].astype(text).merge(whole, "left", self.keys)
         run, gear = index["index_of_run"].to_numpy(), index["gear"].to_numpy()
         return replace(case, records=replace(case.records, run=run, specimen=gear))
+
+
+def senses(x: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Return the sense of each row of records with an index, as `derive_motion` does.
+
+    Records without noise in the deformation, most of them, are taken all at once, which
+    saves a third of the time of reading.
+    """
+    order = np.argsort(index, kind="stable")
+    read, record = x[order], index[order]
+    begins = np.diff(record, prepend=-1) != 0
+    step = np.where(begins, 0.0, np.diff(read, prepend=0.0))
+    signs = pd.Series(np.where(step == 0.0, np.nan, np.sign(step)))
+    signs = signs.groupby(record).ffill().groupby(record).bfill()
+    sense = np.empty(len(x))
+    sense[order] = signs.fillna(1.0)
+    # Records with movements that noise could hide.
+    first = begins | (np.diff(sense[order], prepend=0.0) != 0.0)
+    travel = np.bincount(np.cumsum(first) - 1, np.abs(step))
+    rows = np.flatnonzero(begins)
+    span = np.maximum.reduceat(read, rows) - np.minimum.reduceat(read, rows)
+    small = travel < TURN_MOST * span[record[first]]
+    hard = (np.bincount(record[first], small) > 0.0)[index]
+    if hard.any():
+        sense[hard] = derive_motion(x[hard], index[hard]).sense
+    return sense
 
 
 def _irregular(
