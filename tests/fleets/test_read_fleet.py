@@ -10,9 +10,10 @@ import pytest
 from gear_records import SIZES, records, refused, same
 from pyarrow import dataset as tables
 
+from hdcal.data.loading import derive_motion
 from hdcal.data.measurements import parquet
 from hdcal.fleets.reading import parquet_readings
-from hdcal.fleets.reading.parquet_readings import BatchSums
+from hdcal.fleets.reading.parquet_readings import BatchSums, senses
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.inference.distributions import moments
 
@@ -75,6 +76,22 @@ def test_batches_come_to_what_all_rows_come_to(tmp_path, monkeypatch, batch, mix
     for name in ("force", "deformation", "run", "specimen"):
         mine, theirs = (getattr(each.case.records, name) for each in (found, whole))
         assert np.array_equal(mine, theirs[:50]), name
+
+
+def test_senses_are_those_of_derive_motion():
+    rng = np.random.default_rng(1)
+    up, down = np.linspace(0.02, 0.5, 30), np.linspace(0.49, 0.03, 25)
+    kinds = [up, np.r_[up, down], np.r_[up, up], np.r_[up, down, up + 1e-3, down], -up]
+    kinds += [np.linspace(0.0, 0.5, 90) + rng.normal(0.0, 0.02, 90), np.full(6, 0.3)]
+    kinds += [up[:1]]
+    index = np.repeat(np.arange(len(kinds)), [len(each) for each in kinds])
+    x, order = np.concatenate(kinds), np.argsort(rng.random(len(index)), kind="stable")
+    mixed = index[order]
+    values = np.empty(len(x))
+    for k, each in enumerate(kinds):
+        values[mixed == k] = each
+    for value, of in ((x, index), (values, mixed)):
+        assert np.array_equal(senses(value, of), derive_motion(value, of).sense)
 
 
 def test_folders_may_be_partitioned_and_labels_of_any_kind(tmp_path):

@@ -32,7 +32,7 @@ def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     verb = "is" if len(bad) == 1 else "are"
     words = f"{len(bad)} of {many or 'the'} gears {verb} bad: "
     words += shortened([*map(quoted, bad)], _LISTED)
-    remedy = "Set it to leave these gears out as a whole and evaluate the others"
+    remedy = "Use it to leave these gears out and evaluate the others"
     return Finding("skip_bad", words, remedy)
 
 

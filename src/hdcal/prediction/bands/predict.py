@@ -190,9 +190,10 @@ def _range_words(case: Case) -> str:
     low, high = np.min(records.deformation), np.max(records.deformation)
     cold, warm = np.min(records.temperature), np.max(records.temperature)
     ways = [n for n in DIRECTIONS if SENSE[n] in np.asarray(records.sense)]
+    warmth = f"{cold:g} °C" if cold == warm else f"{cold:g} … {warm:g} °C"
     return (
-        f"{low:g} … {high:g} {case.units.displacement_unit}, {cold:g} … {warm:g} °C, "
-        f"{' and '.join(ways)}"
+        f"{low:g} … {high:g} {case.units.displacement_unit}, {warmth}, "
+        f"direction {' and '.join(ways)}"
     )
 
 
