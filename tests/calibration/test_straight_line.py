@@ -156,4 +156,4 @@ def test_calibrate_takes_the_straight_part_unless_all_is_asked_for(
     answer = json.loads(done.stdout)
     middle = answer["stiffness_N_per_mm"]["median"]
     assert middle == pytest.approx(expected, rel=0.02)
-    assert "no straight line" in answer["headline"]
+    assert "not straight" in answer["headline"]
