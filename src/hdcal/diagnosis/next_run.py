@@ -42,7 +42,7 @@ class NextRun(Item):
     information_nats: float
 
 
-class Candidate(NamedTuple):
+class CandidateRun(NamedTuple):
     """A run in words, its effort over that of a ramp, and its rows."""
 
     words: str
@@ -52,7 +52,7 @@ class Candidate(NamedTuple):
 
 def candidate_runs(
     records: Records, reference_temperature: float
-) -> Iterator[Candidate]:
+) -> Iterator[CandidateRun]:
     """Yield runs that show what the measured ones cannot, given T_ref [°C]."""
     known, paths, pace = records.known, _paths(records), _pace(records)
     warmth = np.asarray(records.temperature)
@@ -61,7 +61,7 @@ def candidate_runs(
     other = last + _WARMER if near else reference_temperature
 
     def run(words, effort, path, pace=pace, **columns):
-        return Candidate(words, effort, _run(records, path, pace, **columns))
+        return CandidateRun(words, effort, _run(records, path, pace, **columns))
 
     loop = paths["loop"]
     if "unloading" not in known:
