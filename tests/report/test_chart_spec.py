@@ -101,6 +101,10 @@ def test_panels_are_placed_in_rows_below_a_wide_one():
     assert [each.rowspan.start for each in rows] == [0, 1, 1, 2]
     assert [each.colspan.start for each in rows] == [0, 0, 1, 0]
     assert rows[0].colspan.stop == 2
+    wide = [each["wide"] for each in json.loads(chart_json(chart))]
+    assert wide == [True, False, False, False]
+    below = json.loads(chart_json(Chart(panels=small)))
+    assert [each["wide"] for each in below] == 3 * [True]
     # The legend of the first panel is that of all.
     assert [axes.get_legend() is None for axes in figure.axes] == [False] + 3 * [True]
 

@@ -101,7 +101,7 @@ class Fits(Result):
             name, hue = curve.model, CYCLE[place % len(CYCLE)]
             dash = "solid" if curve.intercept else "dashed"
             low, high = force - half, force + half
-            marks.append(Band(label=name, x=grid, low=low, high=high, colour=hue))
+            marks.append(Band(x=grid, low=low, high=high, colour=hue))
             marks.append(Line(label=name, x=grid, y=force, colour=hue, dash=dash))
         force = np.asarray(self.case.records.force)
         points: Mark = Points(label="readings", x=x, y=force)

@@ -22,15 +22,17 @@ _DIGITS = 6
 
 def chart_json(chart: Chart) -> str:
     """Return a chart as the text of a script element, which cannot end the element."""
-    panels = [_Columns(panel).to_dict() for panel in chart.panels]
+    # Panels below each other take the whole row, as in the image.
+    whole = chart.columns == 1
+    panels = [_Columns(panel, panel.wide or whole).to_dict() for panel in chart.panels]
     return json.dumps(panels, separators=(",", ":")).replace("<", "\\u003c")
 
 
 class _Columns:
     """Series of a panel over one axis, as uPlot takes them."""
 
-    def __init__(self, panel: Panel):
-        self._panel = panel
+    def __init__(self, panel: Panel, wide: bool):
+        self._panel, self._wide = panel, wide
         self._series: list[dict[str, Any]] = []
         self._values: list[tuple[np.ndarray, np.ndarray, bool]] = []
         self._bands: list[tuple[int, int, float]] = []
@@ -47,7 +49,7 @@ class _Columns:
             "y": panel.y,
             "title": panel.title,
             "height": round(110 * panel.height) or (380 if panel.wide else 300),
-            "wide": panel.wide,
+            "wide": self._wide,
             "limits": list(panel.y_limits),
             "log": [panel.x_log, False],
             "bands": self._bands,

@@ -5,7 +5,7 @@ function touch(figure) {
   const room = document.createElement("div");
   room.className = charts.length > 2 ? "touch many" : "touch";
   const cells = charts.map(() => room.appendChild(document.createElement("div")));
-  charts.forEach((chart, k) => cells[k].classList.toggle("row", chart.wide ?? !k));
+  charts.forEach((chart, k) => cells[k].classList.toggle("row", chart.wide));
   const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const hue = each => each.colour || ink("--ink");
   // Opacity as two digits after a colour.
