@@ -21,8 +21,8 @@ from hdcal.report.charts.chart_spec import (
     Span,
 )
 
-# Beside what Sphinx builds; git ignores it.
-FOLDER = Path("_build") / "pictures"
+# Tracked by git, so that the pages show their pictures without a build, too.
+FOLDER = Path("_static")
 _STIFFNESS = 20.0  # of the straight part [N/mm]
 _X, _Y = "deformation [mm]", "force [N]"
 
@@ -109,7 +109,6 @@ PICTURES = {"toe": toe_picture, "loop": loop_picture}
 def draw(app: Sphinx) -> None:
     """Draw all pictures before the pages are read."""
     folder = Path(app.srcdir) / FOLDER
-    folder.mkdir(parents=True, exist_ok=True)
     for name, picture in PICTURES.items():
         content = images(picture(), name, ("png",))["png"]
         (folder / f"{name}.png").write_bytes(content)
