@@ -84,3 +84,15 @@ def test_texts_with_commas_beside_numbers_are_decimal(tmp_path):
         path = book(tmp_path, **{"Probe 2": [("Probe 2",), (), *HEAD, *spoiled]})
         with pytest.raises(InputError, match=rf"sheet 'Probe 2', row 8.*{cell}"):
             read_case(path, sheet="Probe 2")
+
+
+@pytest.mark.parametrize("cell", ["#DIV/0!", "#N/A", True, False])
+@pytest.mark.parametrize("place", [0, 1])
+def test_errors_of_formulas_and_truths_are_no_numbers(tmp_path, cell, place):
+    spoiled = [[*row] for row in READINGS]
+    spoiled[3][place] = cell
+    path = book(tmp_path, Kurve=[*HEAD, *spoiled])
+    words = "formula error" if isinstance(cell, str) else cell
+    with pytest.raises(InputError, match=f"row 6, .*'{words}' is not a number") as no:
+        read_case(path)
+    assert len(no.value.findings) == 1

@@ -76,5 +76,7 @@ def _cell(cell: Any) -> Any:
     """Return a cell: a number as it is stored, anything else as text."""
     if isinstance(cell, datetime.datetime | datetime.date | datetime.time):
         return cell.isoformat()
+    if cell != cell:  # pandas' reading of #DIV/0! and its like
+        return "formula error"
     number = isinstance(cell, int | float) and not isinstance(cell, bool)
     return cell if number else stored_text(cell)
