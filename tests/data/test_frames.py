@@ -91,7 +91,9 @@ def test_a_gear_may_be_stated_in_memory():
     for wrong, words in (
         ({"gear": "x", **SIZES}, "gear"),
         ({**same, "deformation": "radial"}, "stated twice"),
-        ({**SIZES, 1: 2}, "unknown key"),
+        ({**SIZES, 1: 2}, "'gear.1': unknown key"),
+        ({"gear": {**SIZES, None: 2}}, "'gear.None': unknown key"),
+        ({**same, "priors": {5: 1.0}}, "'priors.5': unknown"),
     ):
         with pytest.raises(InputError, match=words):
             hdcal.read_case(FRAME, wrong)
