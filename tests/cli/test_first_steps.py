@@ -29,11 +29,13 @@ def test_check_draws_the_readings(here: Hdcal, log: Path):
 
 def test_init_makes_a_case(here: Hdcal, log: Path):
     folder = log.parent / "rig"
-    done = here("init", folder, *BEGUN, "--data", log, "--json")
+    given = [*BEGUN, "--nominal", "0.9", "--data", log]
+    done = here("init", folder, *given, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["files"] == ["gear.toml", "data.csv"]
     case = library.read_case(folder)
     assert (case.gear.reading, case.gear.theory) == ("diametral", "ring")
+    assert case.gear.nominal_deformation == 0.9
     assert float(case.records.force[-1]) == 71.0
     assert here("init", folder, *BEGUN).returncode == 2
     # A folder with readings gets its gear file only.
@@ -59,7 +61,12 @@ def test_init_writes_a_sheet_of_a_workbook(here: Hdcal, tmp_path: Path):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (SIZES, "Missing option '--deformation'"),
+        (
+            ["--radius", "40"],
+            "hdcal: --wall: is missing. State it.\n"
+            "hdcal: --length: is missing. State it.\n"
+            "hdcal: --deformation: is missing. State it.\n",
+        ),
         (["--wall", "50", *BEGUN[2:]], "not thinner than the radius"),
         ([*SIZES, "--deformation", "radiall"], "'radial', 'diametral'"),
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),

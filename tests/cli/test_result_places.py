@@ -39,6 +39,19 @@ def test_an_impossible_target_is_refused_first(
     assert os.listdir(tmp_path) == ["mine"] and not os.listdir("mine")
 
 
+@pytest.mark.parametrize(
+    "command", ["check", "calibrate", "diagnose", "fit", "fleet", "causes"]
+)
+def test_a_result_is_no_data(command: str, here: Hdcal, tmp_path: Path):
+    with Target("run") as target, target.filled() as folder:
+        (folder / "bands.csv").write_text("deformation_mm,force_N\n0.1,20\n")
+    done = here(command, "run", "--json")
+    assert done.returncode == 2 and os.listdir(tmp_path) == ["run"]
+    (finding,) = json.loads(done.stdout)["findings"]
+    assert finding["problem"] == "is a result of hdcal, not data"
+    assert "predict, margin" in finding["remedy"]
+
+
 def test_a_table_of_another_program_is_kept(here: Hdcal, calibrated, tmp_path: Path):
     asked = ["predict", calibrated[1], "--deformation", "0.1", "--out"]
     (tmp_path / "readings.csv").write_text("deformation_mm,force_N\n0.1,20\n")

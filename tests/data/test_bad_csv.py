@@ -57,6 +57,7 @@ ONE = [
     (H + "0,0\n1,1\n2,2\n3,3\n", None, None, "4 rows"),
     ("deformation_mm,force\n" + GOOD, 1, "force", "no unit"),
     (fourth("nan"), 4, "force_N", "not a number"),
+    (H + GOOD.replace(".2,4", "#DIV/0!,4"), 4, "deformation_mm", "'#DIV/0!' is not a"),
     (fourth("1e999"), 4, "force_N", "too large"),
     (fourth("1e200"), 4, "force_N", "does not lie between"),
     (fourth(""), 4, "force_N", "empty"),

@@ -47,8 +47,9 @@ def test_every_kind_of_table_is_the_same_case(tmp_path, kind):
     np.testing.assert_array_equal(again.records.force, case.records.force)
 
 
-def test_a_finding_names_row_and_column(folder):
-    wrong = FRAME.assign(**{"Kraft [kN]": [*KN[:-1], np.nan]})
+@pytest.mark.parametrize("cell", [np.nan, False])
+def test_a_finding_names_row_and_column(folder, cell):
+    wrong = FRAME.assign(**{"Kraft [kN]": [*KN[:-1].tolist(), cell]})
     with pytest.raises(InputError) as caught:
         hdcal.read_case(wrong, folder / "gear.toml")
     (found,) = caught.value.findings
@@ -90,7 +91,9 @@ def test_a_gear_may_be_stated_in_memory():
     for wrong, words in (
         ({"gear": "x", **SIZES}, "gear"),
         ({**same, "deformation": "radial"}, "stated twice"),
-        ({**SIZES, 1: 2}, "unknown key"),
+        ({**SIZES, 1: 2}, "'gear.1': unknown key"),
+        ({"gear": {**SIZES, None: 2}}, "'gear.None': unknown key"),
+        ({**same, "priors": {5: 1.0}}, "'priors.5': unknown"),
     ):
         with pytest.raises(InputError, match=words):
             hdcal.read_case(FRAME, wrong)

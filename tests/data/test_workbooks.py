@@ -1,6 +1,7 @@
 """A sheet of a workbook is read as a table; which one is asked where it is unclear."""
 
 import zipfile
+from hashlib import sha256
 
 import numpy as np
 import openpyxl
@@ -84,3 +85,41 @@ def test_texts_with_commas_beside_numbers_are_decimal(tmp_path):
         path = book(tmp_path, **{"Probe 2": [("Probe 2",), (), *HEAD, *spoiled]})
         with pytest.raises(InputError, match=rf"sheet 'Probe 2', row 8.*{cell}"):
             read_case(path, sheet="Probe 2")
+
+
+def test_each_part_of_a_source_has_its_hash(tmp_path):
+    """Of one of several sheets or specimens that of the text HASH NAME."""
+
+    def part(whole, name):
+        return sha256(f"{whole} {name}".encode()).hexdigest()
+
+    table = [*HEAD, *READINGS]
+    path = book(tmp_path, first=table, second=table, notes=[("nothing", "here")])
+    whole = sha256(path.read_bytes()).hexdigest()
+    for name in ("first", "second"):
+        assert read_case(path, sheet=name).data_sha256 == part(whole, name)
+    path = book(tmp_path, first=table, notes=[("nothing", "here")])
+    whole = sha256(path.read_bytes()).hexdigest()
+    each = read_case(path), read_case(path, sheet="first")
+    assert [case.data_sha256 for case in each] == [whole] * 2
+    labels = np.repeat(["a", "b"], 7)
+    arrays = {"deformation_mm": [*DEFORMATION] * 2, "force_N": [*FORCE] * 2}
+    both = arrays | {"specimen": labels}
+    whole = read_case(both).data_sha256
+    for name in "ab":
+        assert read_case(both, specimen=name).data_sha256 == part(whole, name)
+    alone = {name: cells[:7] for name, cells in both.items()}
+    whole = read_case(alone).data_sha256
+    assert read_case(alone, specimen="a").data_sha256 == whole
+
+
+@pytest.mark.parametrize("cell", ["#DIV/0!", "#N/A", True, False])
+@pytest.mark.parametrize("place", [0, 1])
+def test_errors_of_formulas_and_truths_are_no_numbers(tmp_path, cell, place):
+    spoiled = [[*row] for row in READINGS]
+    spoiled[3][place] = cell
+    path = book(tmp_path, Kurve=[*HEAD, *spoiled])
+    words = "formula error" if isinstance(cell, str) else cell
+    with pytest.raises(InputError, match=f"row 6, .*'{words}' is not a number") as no:
+        read_case(path)
+    assert len(no.value.findings) == 1

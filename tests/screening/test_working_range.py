@@ -66,3 +66,15 @@ def test_a_command_takes_it(tmp_path, here):
     assert json.loads(done.stdout)["screening"]["segments"]["outside the range"] == 71
     refused = here("check", str(tmp_path / "data.csv"), "--range", "2:1")
     assert refused.returncode == 2 and "--range" in refused.stderr
+
+
+def test_of_an_angle_the_range_is_in_radians(here):
+    degrees = np.linspace(0.0, 20.0, 41)
+    table = {"angle_deg": degrees, "torque_Nm": 0.5 * degrees}
+    case = hdcal.read_case(table, range="0.05:0.2")
+    inside = np.radians(degrees)
+    inside = inside[(inside >= 0.05) & (inside <= 0.2)]
+    np.testing.assert_allclose(case.records.deformation, inside, rtol=1e-12)
+    with pytest.raises(InputError, match=r"rad.*read from 0 to 0.3491 rad"):
+        hdcal.read_case(table, range="3:12")
+    assert "angle [rad]" in " ".join(here("check", "--help").stdout.split())

@@ -78,10 +78,10 @@ reading_options = combined(
     click.option(
         "--range",
         metavar="LOW:HIGH",
-        help="Use the readings in this range: 0.1:0.6 of the deformation [mm], "
-        "10%:40% of the largest force, straight for the longest straight part, or all "
-        "until the force drops for good [default: all; calibrate takes straight where "
-        "the curve is not a line].",
+        help="Use the readings in this range: 0.1:0.6 of the deformation [mm] or angle "
+        "[rad], 10%:40% of the largest force, straight for the longest straight part, "
+        "or all until the force drops for good [default: all; calibrate takes straight "
+        "where the curve is not a line].",
     ),
 )
 # Which case is read, and how.

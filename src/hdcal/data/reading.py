@@ -56,9 +56,9 @@ def read_case(
         skip_bad: leave out specimens with a faulty row, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
         range: working range; rows outside it are left out: `0.1:0.6` of the
-            deformation as read [mm], `10%:40%` of the largest force of each run, or
-            `straight` for the longest straight part; by default that of the gear file,
-            or `all` that was read until the force drops for good.
+            deformation as read [mm] or the angle [rad], `10%:40%` of the largest force
+            of each run, or `straight` for the longest straight part; by default that of
+            the gear file, or `all` that was read until the force drops for good.
 
     Raises:
         InputError: holds everything that is wrong with either file.

@@ -14,9 +14,8 @@ from typing import Self
 
 from filelock import FileLock, Timeout
 
+from hdcal.data.measurements.gear_files import MARKER
 from hdcal.errors import Finding, InputError, NotWritable
-
-MARKER = "hdcal-result.json"
 
 
 @dataclass

@@ -20,8 +20,8 @@ from hdcal.screening.run import Run
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
 FORM = (
-    "Write it like 0.1:0.6, or 10%:40% of the largest force; or straight, for "
-    "the longest straight part; or all"
+    "Write it like 0.1:0.6 in mm (an angle: rad), or 10%:40% of the largest force; "
+    "or straight, for the longest straight part; or all"
 )
 STRAIGHT = "straight"
 
@@ -47,7 +47,7 @@ class WorkingRange:
         return f"{ends} of one branch" if self.one_branch else ends
 
     def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Tell which rows of a run lie in the range, from readings [mm, N], (n,)."""
+        """Tell which rows of a run lie in the range, from its readings, (n,)."""
         if self.unit == "mm":
             return (deformation >= self.low) & (deformation <= self.high)
         size = np.abs(force)
@@ -56,7 +56,7 @@ class WorkingRange:
 
 
 def read_range(text: str) -> WorkingRange:
-    """Read LOW:HIGH in mm or %, `straight` or `all`; or raise ValueError with words."""
+    """Read LOW:HIGH in mm (rad) or %, `straight` or `all`; else raise ValueError."""
     if text.strip() in ("all", STRAIGHT):
         unit = "mm" if text.strip() == "all" else STRAIGHT
         return WorkingRange(-math.inf, math.inf, unit)

@@ -14,14 +14,16 @@ from hdcal.errors import Finding, InputError
 # Named as the keys of the gear file.
 _sizes = combined(
     *(
-        click.option(option, key, type=float, required=True, help=f"{words} [mm].")
+        click.option(option, key, type=float, help=f"{words} [mm].")
         for option, key, words in (
             ("--wall", "wall_thickness_mm", "Wall thickness"),
             ("--radius", "radius_mm", "Radius to the middle of the wall"),
             ("--length", "length_mm", "Length of the gear"),
+            ("--nominal", "nominal_deformation_mm", "Nominal deformation, as read"),
         )
     )
 )
+_NEEDED = ("wall_thickness_mm", "radius_mm", "length_mm", "deformation")
 
 
 @command(short_help="Write a case folder from the sizes of a gear.")
@@ -30,7 +32,6 @@ _sizes = combined(
 @click.option("--material", default="steel", show_default=True, help="Material.")
 @click.option(
     "--deformation",
-    required=True,
     type=click.Choice(READINGS),
     help="Deformation as read, radial or diametral.",
 )
@@ -47,14 +48,21 @@ _sizes = combined(
 @json_option
 @click.pass_obj
 def init(console: Console, folder, data, columns, sheet, **stated):
-    """Write FOLDER with a gear file, and with readings where there are any."""
+    """Write FOLDER with a gear file, and with readings where there are any.
+
+    All sizes but the nominal deformation, and --deformation, are required.
+    """
     from hdcal.data.gear import read_gear
     from hdcal.data.gear_file.toml_file import gear_text
     from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME
     from hdcal.data.reading import read_case
     from hdcal.data.tables.sources import text_of
 
-    tables = {"name": Path(folder).resolve().name, **stated}
+    given = {key: value for key, value in stated.items() if value is not None}
+    missing = [key for key in _NEEDED if key not in given]
+    if missing:
+        raise InputError(Finding(key, "is missing", "State it") for key in missing)
+    tables = {"name": Path(folder).resolve().name, **given}
     if str(tables["material"]).endswith(".toml"):
         # A gear file names another file relative to its folder.
         tables["material"] = os.path.abspath(str(tables["material"]))

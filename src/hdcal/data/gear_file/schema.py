@@ -78,10 +78,7 @@ class GearFile(BaseModel):
 
 def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the tables of a gear file from a mapping, with or without their names."""
-    plain = {
-        str(key): dict(value) if isinstance(value, Mapping) else value
-        for key, value in source.items()
-    }
+    plain = _with_text_keys(source)
     tables = {"gear": {}} | {n: plain[n] for n in GearFile.model_fields if n in plain}
     for key in plain.keys() - GearFile.model_fields.keys():
         name = "measurement" if key in MeasurementTable.model_fields else "gear"
@@ -93,6 +90,14 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
             raise InputError([Finding(key, words, "State it once")])
         table[key] = plain[key]
     return tables
+
+
+def _with_text_keys(table: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return a copy of a table and those inside it; other keys become unknown ones."""
+    return {
+        str(key): _with_text_keys(value) if isinstance(value, Mapping) else value
+        for key, value in table.items()
+    }
 
 
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:

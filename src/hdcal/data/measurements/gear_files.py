@@ -9,6 +9,7 @@ from typing import Any
 from hdcal.errors import Finding, InputError, quoted, shortened
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
+MARKER = "hdcal-result.json"  # file in each folder that hdcal wrote as a result
 # Tables of readings by their names. A text may be a remark: it counts as one only where
 # nothing else does.
 _TABLES = (".csv", ".tsv", ".dat", ".asc", ".lvm", ".xlsx", ".parquet")
@@ -17,9 +18,16 @@ _LISTED = 3
 
 
 def gear_files(data: Any) -> list[Path]:
-    """Return the files of a folder that has one for each gear; none of other data."""
+    """Return the files of a folder that has one for each gear; none of other data.
+
+    A folder that hdcal wrote as a result is an InputError.
+    """
     if not isinstance(data, str | Path) or not os.path.isdir(data):
         return []
+    if os.path.exists(Path(data) / MARKER):
+        words, remedy = "is a result of hdcal, not data", "Name the data; results are "
+        remedy += "read by predict, margin, respond, design, track and compare"
+        raise InputError([Finding(str(data), words, remedy)])
     inside = sorted(one for one in Path(data).iterdir() if one.name[0] not in "._")
     if any(one.name == DATA_NAME for one in inside):
         return []

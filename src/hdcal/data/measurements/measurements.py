@@ -29,7 +29,7 @@ from hdcal.data.tables.columns import (
     in_place_of_force,
 )
 from hdcal.data.tables.headers import QUANTITIES
-from hdcal.data.tables.sources import IN_MEMORY, is_frame, read_source
+from hdcal.data.tables.sources import IN_MEMORY, is_frame, part_sha256, read_source
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted, shortened
 from hdcal.quantities import FORCE, TORQUE, Quantities
@@ -201,7 +201,10 @@ def _with_time(
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
-    """Return the measurements of one specimen, or raise InputError."""
+    """Return the measurements of one specimen, or raise InputError.
+
+    The hash is that of a part of the source, where it holds several specimens.
+    """
     findings, (_, names) = FileFindings(measured.file), measured.gears
     name = quoted(label)
     if label not in names:
@@ -216,6 +219,8 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     if is_constant(one["deformation"]):
         words = f"the {measured.units.displacement} of specimen {name} is constant"
         findings.refuse(words, "Measure at several")
+    if len(names) + len(measured.left_out) > 1:
+        return replace(one, sha256=part_sha256(measured.sha256, label))
     return one
 
 

@@ -26,7 +26,8 @@ _SUMMARIES = {
     *("standard deviation", "mittelwert", "summe", "standardabweichung", "stdabw"),
     *("moyenne", "somme", "écart type", "平均", "平均值", "最大值", "最小值"),
 }
-_COMMENT = re.compile(r"[#%]")
+# Not the errors of spreadsheets: #DIV/0!, #N/A.
+_COMMENT = re.compile(r"#(?!(N/A|NV|[A-ZÀ-Ü]+(/0)?[!?])$)|%")
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,18 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings, did_you_mean
+from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
     DIMENSIONS,
     GROUPINGS,
     LABELS,
-    QUANTITIES,
     Header,
     parse_header,
     unit_advice,
     weight_unit,
 )
+from hdcal.data.tables.naming import check_names, places_named, split_brackets
 from hdcal.data.units import Unit, find_unit
 from hdcal.errors import quoted
 
@@ -54,7 +54,7 @@ def choose_columns(
     these are angle and torque. The mapping is from quantities to headers with the unit
     in square brackets, or to numbers of columns.
     """
-    _check_names(table, mapping, findings)
+    check_names(table, mapping, findings)
     chooser = _Chooser(table, findings)
     columns: dict[str, Column] = {}
     if {*REQUIRED} <= {*required}:
@@ -104,21 +104,6 @@ def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
     return named
 
 
-def _check_names(
-    table: ReadTable, mapping: Mapping[str, str], findings: FileFindings
-) -> None:
-    """Refuse a table without headers, and quantities that do not exist."""
-    if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
-        words = f"no row of headers names the {len(table.headers)} columns: the first "
-        words += "row holds numbers where the headers should be"
-        remedy = "Say which column is which by its number, as in `columns` "
-        remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
-        findings.refuse(words, remedy, table.header_row)
-    for quantity in (name for name in mapping if name not in QUANTITIES):
-        words = f"`columns` {quantity}=… names no quantity that hdcal knows"
-        findings.add(words, did_you_mean(quantity, [*QUANTITIES]))
-
-
 class _Chooser:
     """Choice of one column after the other, with findings on what is wrong."""
 
@@ -129,8 +114,8 @@ class _Chooser:
     def named(self, quantity: str, wanted: str) -> Column | None:
         """Return the column that a user named: 'Load [kN]', 'Load[kN]' or '2[kN]'."""
         headers = self._table.headers
-        name, unit_text = _split_brackets(wanted)
-        places, option = _places(wanted, name, headers), f"`columns` {quantity}="
+        name, unit_text = split_brackets(wanted)
+        places, option = places_named(wanted, headers), f"`columns` {quantity}="
         if len(places) != 1:
             near = get_close_matches(name, headers, 1, 0.4) or headers[:_SHOWN]
             words = f"{option}{wanted} names a column that is not there"
@@ -271,30 +256,6 @@ class _Chooser:
                 remedy += f"{place + 1}[{unit}]'"
                 break
         self._findings.add(words, remedy, self._table.header_row, quantity)
-
-
-def _places(wanted: str, name: str, headers: tuple[str, ...]) -> list[int]:
-    """Return the places of the columns that a text may name."""
-
-    def called(names: set[str], texts: Sequence[str]) -> list[int]:
-        return [i for i, text in enumerate(texts) if "".join(text.split()) in names]
-
-    # A header may itself end in brackets, so the whole text is tried as well.
-    places = called({"".join(text.split()) for text in (wanted, name)}, headers)
-    bare = [_split_brackets(header)[0] for header in headers]
-    places = places or called({"".join(name.split())}, bare)
-    if not places and name.isdigit() and 0 < int(name) <= len(headers):
-        return [int(name) - 1]
-    return places
-
-
-def _split_brackets(text: str) -> tuple[str, str | None]:
-    """`Load [kgf]` -> (`Load`, `kgf`); no unit where the text ends in no brackets."""
-    text = text.strip()
-    name, opening, unit = text.removesuffix("]").rpartition("[")
-    if not (opening and text.endswith("]")) or "]" in unit:
-        return text, None
-    return name.rstrip(), unit.strip()
 
 
 def _refuse_conflicts(

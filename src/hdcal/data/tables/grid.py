@@ -150,7 +150,7 @@ def _plain_column(column: pd.Series) -> np.ndarray:
         return np.append(cells.astype(object), "")[column.cat.codes]
     objects = column.astype(object).where(column.notna(), "").to_numpy()
     cells = [
-        c if isinstance(c, int | float) and c is not True else stored_text(c)
+        c if isinstance(c, int | float) and not isinstance(c, bool) else stored_text(c)
         for c in objects
     ]
     return np.array(cells, object)

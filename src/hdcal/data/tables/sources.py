@@ -46,7 +46,10 @@ def read_source(
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> tuple[ReadTable, str]:
-    """Return the table of a file, a DataFrame or arrays by name, and its hash."""
+    """Return the table of a file, a DataFrame or arrays by name, and its hash.
+
+    Where several sheets of a workbook hold readings, that of the sheet: `part_sha256`.
+    """
     if is_frame(data):
         grid, sha256 = memory_grid(data, findings)
         return table_of(grid, findings), sha256
@@ -88,14 +91,14 @@ def _kind(path: Path) -> bytes:
 def _file_table(
     path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
 ) -> tuple[ReadTable, str]:
-    kind, notes = _kind(path), []
+    kind, notes, part = _kind(path), [], ""
     if kind and encoding is not None:
         words = f"is {_KINDS[kind]}, which has no `encoding`"
         findings.refuse(words, "Leave it out")
     if kind != _WORKBOOK and sheet is not None:
         findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
     if kind == _WORKBOOK:
-        grid, notes = sheet_grid(path, findings, sheet)
+        grid, notes, part = sheet_grid(path, findings, sheet)
     elif kind == PARQUET:
         grid = parquet_grid(path, findings)
     elif kind:
@@ -109,13 +112,20 @@ def _file_table(
         grid, notes = text_grid(text)
         notes = [*guessed, *notes]
     table = table_of(grid, findings)
-    return replace(table, notes=(*notes, *table.notes)), file_sha256(path)
+    sha256 = file_sha256(path)
+    sha256 = part_sha256(sha256, part) if part else sha256
+    return replace(table, notes=(*notes, *table.notes)), sha256
 
 
 def file_sha256(path: Path | str) -> str:
     """Return the hash of a file."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def part_sha256(whole: str, name: str) -> str:
+    """Return the hash of a named part, from that of the source of several parts."""
+    return hashlib.sha256(f"{whole} {name}".encode()).hexdigest()
 
 
 def table_of(grid: Grid, findings: FileFindings) -> ReadTable:

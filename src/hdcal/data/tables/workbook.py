@@ -18,15 +18,18 @@ _FEWEST = 5  # rows with two numbers or more that make a sheet a table of readin
 
 def sheet_grid(
     path: Path, findings: FileFindings, sheet: str | None
-) -> tuple[Grid, list[str]]:
-    """Return a sheet, by default the only one with readings, and a note on that."""
+) -> tuple[Grid, list[str], str]:
+    """Return a sheet, by default the only one with readings, and a note on that.
+
+    The text is the sheet's name where several sheets hold readings, else empty.
+    """
     sheets = _sheets(path, findings)
     names = ", ".join(map(quoted, sheets))
-    if sheet is not None:
-        if sheet not in sheets:
-            findings.refuse(f"has no `sheet` {quoted(sheet)}", f"Name one of: {names}")
-        return sheets[sheet], []
+    if sheet is not None and sheet not in sheets:
+        findings.refuse(f"has no `sheet` {quoted(sheet)}", f"Name one of: {names}")
     likely = [name for name, grid in sheets.items() if _is_table(grid)]
+    if sheet is not None:
+        return sheets[sheet], [], sheet if {*likely} - {sheet} else ""
     if not likely:
         words = f"no sheet holds a table of readings: {names}"
         remedy = f"Write at least {_FEWEST} rows of readings below headers; formulas "
@@ -36,7 +39,7 @@ def sheet_grid(
         words = f"{len(likely)} sheets hold a table: {', '.join(map(quoted, likely))}"
         findings.refuse(words, "Say which with `sheet`")
     note = f"sheet {quoted(likely[0])} is read. If another is meant, name it"
-    return sheets[likely[0]], [note] if len(sheets) > 1 else []
+    return sheets[likely[0]], [note] if len(sheets) > 1 else [], ""
 
 
 def _is_table(grid: Grid) -> bool:
@@ -76,5 +79,7 @@ def _cell(cell: Any) -> Any:
     """Return a cell: a number as it is stored, anything else as text."""
     if isinstance(cell, datetime.datetime | datetime.date | datetime.time):
         return cell.isoformat()
+    if cell != cell:  # pandas' reading of #DIV/0! and its like
+        return "formula error"
     number = isinstance(cell, int | float) and not isinstance(cell, bool)
     return cell if number else stored_text(cell)
