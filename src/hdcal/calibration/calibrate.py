@@ -96,11 +96,7 @@ def calibrate(
     problem = build_problem(case, shipped, chosen, theory=theory, structure=form)
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    # Far from the origin the middle of the wide prior of the zero is no place to start.
-    start = {"_centre_force": float(case.records.force.mean())}
-    mode = laplace.fit(
-        problem, start if priors["force_offset"].family != "fixed" else {}
-    )
+    mode = laplace.fit(problem)
     found = sample(problem, mode, seed, progress=progress, **size)
     stiffness, records = found.values["stiffness"], case.records
     checks = [

@@ -1,7 +1,8 @@
 """The posterior mode and its curvature: whitened coordinates of the sampler."""
 
 from collections.abc import Mapping
-from functools import lru_cache
+from contextlib import suppress
+from functools import lru_cache, partial
 from typing import Any
 
 import equinox as eqx
@@ -12,7 +13,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
 from numpyro.distributions import biject_to
 from numpyro.handlers import substitute, trace
-from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
+from numpyro.infer.util import constrain_fn, potential_energy
 from scipy.optimize import minimize
 
 from hdcal.data.records import Array
@@ -58,10 +59,11 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
     """Find the posterior mode and its curvature.
 
     A poor mode costs speed, never correctness: NUTS samples the exact density in any
-    coordinates. The search starts at known values of sites, else in the middle of the
-    priors.
+    coordinates. The search starts at known values of sites, by default those of the
+    problem, else in the middle of the priors.
     """
-    place, flat = _start(problem, dict(start or {}))
+    known = problem.start if start is None else start
+    place, flat = _start(problem, dict(known))
     flat = np.asarray(flat)
     hessian = np.asarray(_expand(problem, place, flat)[2])
     # Parameters differ by many orders in scale: a trust region needs one scale.
@@ -92,27 +94,43 @@ def fit(problem: Sampled, start: Mapping[str, float] | None = None) -> Whitening
 
 @jax.jit
 def _start(problem: Sampled, known: Position) -> tuple[Position, Float[Array, " d"]]:
-    """Return the position where a search starts, and the same flattened."""
-    sites = trace(substitute(model, substitute_fn=_prior_middle)).get_trace(problem)
+    """Return the position where a search starts, and the same flattened.
+
+    A known value outside the support of its prior is left out.
+    """
+    choose = partial(_first_value, known=known)
+    sites = trace(substitute(model, substitute_fn=choose)).get_trace(problem)
     position = {
         name: biject_to(site["fn"].support).inv(site["value"])
         for name, site in sites.items()
-        if site["type"] == "sample" and not site["is_observed"]
+        if _is_parameter(site)
     }
-    if known:
-        values = constrain_fn(model, (problem,), {}, position) | known
-        position = unconstrain_fn(model, (problem,), {}, values)
     return position, ravel_pytree(position)[0]
 
 
-def _prior_middle(site: dict[str, Any]):
-    """Return the prior median of a site, or its mean where no median is known."""
-    if site["type"] != "sample" or site["is_observed"]:
+def _first_value(site: dict[str, Any], known: Position):
+    """Return the known value of a site, if it can be, else the prior's middle."""
+    if not _is_parameter(site):
         return None
-    try:
-        return site["fn"].icdf(0.5)
-    except (NotImplementedError, ImportError):
-        return site["fn"].mean
+    fn, middle = site["fn"], _prior_middle(site["fn"])
+    if site["name"] not in known:
+        return middle
+    # Outside the support, or at its ends, the coordinate is NaN or infinite.
+    value = jnp.asarray(known[site["name"]], float)
+    possible = jnp.isfinite(biject_to(fn.support).inv(value)).all()
+    return jnp.where(possible, value, middle)
+
+
+def _is_parameter(site: dict[str, Any]) -> bool:
+    return site["type"] == "sample" and not site["is_observed"]
+
+
+def _prior_middle(fn: Any):
+    """Return the median of a prior, its mean, or else the middle of its support."""
+    for middle in (lambda: fn.icdf(0.5), lambda: fn.mean):
+        with suppress(NotImplementedError, ImportError):
+            return middle()
+    return biject_to(fn.support)(0.0)
 
 
 @jax.jit

@@ -1,7 +1,7 @@
 """The interface of what is sampled: priors and a declared density."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 
@@ -18,6 +18,11 @@ class Sampled(eqx.Module):
     def sampled_weights(self) -> int:
         """Number of weights of a discrepancy that is not integrated out."""
         return 0
+
+    @property
+    def start(self) -> Mapping[str, Any]:
+        """Known values of sites where a search of the mode starts."""
+        return {}
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""

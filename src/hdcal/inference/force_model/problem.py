@@ -1,6 +1,7 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -65,6 +66,8 @@ class Problem(Sampled):
     step: Float[Array, ""] | float
     # Middle of the deformations as read [mm].
     centre: Float[Array, ""] | float
+    # Mean of the readings [N].
+    level: Float[Array, ""] | float
     count: int
     # From `previous_rows`, if neighbours are correlated.
     before: Int[Array, " n"] | None
@@ -85,6 +88,11 @@ class Problem(Sampled):
         """Number of weights of a discrepancy that is not integrated out."""
         is_sampled = "discrepancy" not in self.integrated
         return self.discrepancy.size if self.discrepancy and is_sampled else 0
+
+    @property
+    def start(self) -> Mapping[str, Any]:
+        """The mean reading: the middle of a wide prior of the zero can be far off."""
+        return {"_centre_force": self.level}
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the priors, that of the force zero given how mountings differ.
@@ -180,6 +188,7 @@ def build_problem(
         specimens=members.get("specimen", 0),
         integrated=tuple(integrated),
         centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
+        level=float(np.mean(records.force)),
     )
 
 
