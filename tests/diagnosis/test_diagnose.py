@@ -11,7 +11,13 @@ from schema_checks import obeys
 from hdcal.diagnosis.charts import gap_chart
 from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.diagnose import diagnose
-from hdcal.diagnosis.gap import GapByRow, closed_on_left_out, fitted, gap_by_row
+from hdcal.diagnosis.gap import (
+    GapByRow,
+    _blocks,
+    closed_on_left_out,
+    fitted,
+    gap_by_row,
+)
 from hdcal.diagnosis.next_run import candidate_runs, rank_runs
 from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.result import Diagnosis
@@ -36,7 +42,7 @@ def plain() -> Searched:
 def closed(searched: Searched, name: str):
     fit = fitted(searched, searched.table.posterior(TEMPERATURE), [name])
     rng = np.random.default_rng(0)
-    return closed_on_left_out(searched, fit, [name], rng)
+    return closed_on_left_out(searched, fit, [name], rng)[0]
 
 
 def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):
@@ -48,6 +54,16 @@ def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):
 def test_another_effect_does_not(looped, name):
     found = closed(looped, name)
     assert found is not None and found.hi < 0.3
+
+
+def test_rows_left_out_are_half_cycles_or_where_these_are_few_stretches():
+    block, word = _blocks(rich(), by_member=False)
+    turns = np.diff(np.asarray(rich().sense)) != 0
+    assert word == "a half cycle" and np.array_equal(np.diff(block) > 0, turns)
+    block, word = _blocks(rich(), by_member=True)
+    assert word == "a quarter of each run" and {*block} == {0, 1, 2, 3}
+    block, word = _blocks(ramp(60), by_member=False)
+    assert word == "a stretch of rows" and np.bincount(block).tolist() == [10] * 6
 
 
 def test_the_share_that_closes_of_no_gap_is_not_known(plain):
