@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
-from rigs import ramp
+from rigs import make_records, ramp
 from schema_checks import obeys
 
 from hdcal.diagnosis.charts import gap_chart
@@ -178,3 +178,17 @@ def test_a_pattern_has_its_covariate_and_size(name: str):
     assert 0.6 * swing < found[0].size_N.median < 1.5 * swing
     assert found[0].material
     assert not find_patterns(linear_problem(simulated(records, seed=1), {}), case)
+
+
+def test_the_size_of_a_bend_through_zero_is_that_of_one_side():
+    x = np.concatenate([np.linspace(-0.5, 0.5, 90), np.linspace(0.5, -0.5, 90)])
+    records = make_records(
+        x, known={"unloading", "cycles"}, sense=np.repeat([1.0, -1.0], 90)
+    )
+    case = simulated(records, seed=1)
+    force = np.asarray(case.records.force) + 40.0 * x * np.abs(x)
+    case = replace(case, records=replace(case.records, force=force))
+    (bend,) = find_patterns(linear_problem(case, {}), case)
+    # The ends lie a quarter of their 10 N off the line of least squares.
+    assert "stiffens" in bend.statement
+    assert bend.size_N.median == pytest.approx(2.5, abs=0.4)
