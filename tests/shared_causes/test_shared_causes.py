@@ -24,7 +24,7 @@ LIBRARY = {
     for name in ("coulomb_friction", "large_deflection", "run_offset")
 }
 FRICTION = {"coulomb_friction": LIBRARY["coulomb_friction"]}
-WITH_LOOP = ("G1", "G2", "G3", "G4")
+WITH_LOOP = ("G 1", "G2", "G3", "G4")
 GEARS = (*WITH_LOOP, "G5", "G6", "G7")
 
 
@@ -51,7 +51,7 @@ def with_loop():
 
 @pytest.fixture(scope="module")
 def one_gear():
-    return usable_gears(read_gears(fleet(0.8)))[1]["G1"]
+    return usable_gears(read_gears(fleet(0.8)))[1]["G 1"]
 
 
 def causes_of(found: FleetCauses) -> list[tuple[str, ...]]:
@@ -177,6 +177,7 @@ def test_a_bad_gear_is_named_and_left_out_when_asked(monkeypatch, how: str):
     assert tuple(found.to_frame().gear) == (*(g for g in GEARS if g != "G5"), "G5")
     assert [*found.left_out] == ["G5"] and found.gears == 6
     assert causes_of(found)[:4] == [("coulomb_friction",)] * 4
+    assert "`--specimen 'G 1'`" in str(found.next_step)
 
 
 @pytest.mark.parametrize(
@@ -191,7 +192,7 @@ def test_a_failed_evidence_is_a_finding(monkeypatch, one_gear, part, result):
 
     monkeypatch.setattr(gear_evidence, part, broken)
     found = weigh_gear(one_gear, FRICTION, 0)
-    assert isinstance(found, Finding) and "'G1'" in found.file
+    assert isinstance(found, Finding) and "'G 1'" in found.file
 
 
 def test_the_command_answers_and_writes_its_table(here: Hdcal, tmp_path, monkeypatch):
@@ -213,7 +214,7 @@ def test_the_command_answers_and_writes_its_table(here: Hdcal, tmp_path, monkeyp
 
 def test_bad_requests_are_one_finding_each(here: Hdcal, tmp_path):
     table = fleet(0.8)
-    table[table.specimen == "G1"].to_csv(tmp_path / "line.csv", index=False)
+    table[table.specimen == "G 1"].to_csv(tmp_path / "line.csv", index=False)
     done = here("causes", "line.csv", "--library", "all", "--jobs", 0)
     assert done.returncode == 2
     assert "3 or more" in done.stderr
