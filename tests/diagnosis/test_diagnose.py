@@ -5,13 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
-from rigs import ramp
+from rigs import make_records, ramp
 from schema_checks import obeys
 
 from hdcal.diagnosis.charts import gap_chart
 from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.diagnose import diagnose
-from hdcal.diagnosis.gap import GapByRow, closed_on_left_out, fitted, gap_by_row
+from hdcal.diagnosis.gap import (
+    GapByRow,
+    _blocks,
+    closed_on_left_out,
+    fitted,
+    gap_by_row,
+)
 from hdcal.diagnosis.next_run import candidate_runs, rank_runs
 from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.result import Diagnosis
@@ -36,7 +42,7 @@ def plain() -> Searched:
 def closed(searched: Searched, name: str):
     fit = fitted(searched, searched.table.posterior(TEMPERATURE), [name])
     rng = np.random.default_rng(0)
-    return closed_on_left_out(searched, fit, [name], rng)
+    return closed_on_left_out(searched, fit, [name], rng)[0]
 
 
 def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):
@@ -48,6 +54,16 @@ def test_the_true_effect_closes_the_gap_on_rows_left_out(looped):
 def test_another_effect_does_not(looped, name):
     found = closed(looped, name)
     assert found is not None and found.hi < 0.3
+
+
+def test_rows_left_out_are_half_cycles_or_where_these_are_few_stretches():
+    block, word = _blocks(rich(), by_member=False)
+    turns = np.diff(np.asarray(rich().sense)) != 0
+    assert word == "a half cycle" and np.array_equal(np.diff(block) > 0, turns)
+    block, word = _blocks(rich(), by_member=True)
+    assert word == "a quarter of each run" and {*block} == {0, 1, 2, 3}
+    block, word = _blocks(ramp(60), by_member=False)
+    assert word == "a stretch of rows" and np.bincount(block).tolist() == [10] * 6
 
 
 def test_the_share_that_closes_of_no_gap_is_not_known(plain):
@@ -162,3 +178,17 @@ def test_a_pattern_has_its_covariate_and_size(name: str):
     assert 0.6 * swing < found[0].size_N.median < 1.5 * swing
     assert found[0].material
     assert not find_patterns(linear_problem(simulated(records, seed=1), {}), case)
+
+
+def test_the_size_of_a_bend_through_zero_is_that_of_one_side():
+    x = np.concatenate([np.linspace(-0.5, 0.5, 90), np.linspace(0.5, -0.5, 90)])
+    records = make_records(
+        x, known={"unloading", "cycles"}, sense=np.repeat([1.0, -1.0], 90)
+    )
+    case = simulated(records, seed=1)
+    force = np.asarray(case.records.force) + 40.0 * x * np.abs(x)
+    case = replace(case, records=replace(case.records, force=force))
+    (bend,) = find_patterns(linear_problem(case, {}), case)
+    # The ends lie a quarter of their 10 N off the line of least squares.
+    assert "stiffens" in bend.statement
+    assert bend.size_N.median == pytest.approx(2.5, abs=0.4)

@@ -1,5 +1,6 @@
 """The result of a fleet: what it says, its table, its files, and what it refuses."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from hdcal.fleets.reading.readings import FleetReadings, fleet_readings
 from hdcal.fleets.result import Fleet
 from hdcal.inference.posterior import Posterior
 from hdcal.quantities import TORQUE
+from hdcal.report.table_files import columns_csv, frame_parquet
 
 
 def with_case(**changes) -> FleetReadings:
@@ -33,7 +35,7 @@ def of(readings: FleetReadings, odd=None, **asked) -> Fleet:
 
 def test_the_odd_gear_is_named_first_and_in_the_table():
     fleet = handmade()
-    assert fleet.headline.startswith("3 of 4 gears agree within ")
+    assert fleet.headline.startswith("3 of 4 gears scatter by ")
     assert "D is 9.76 % softer (95 %: 9.48 … " in fleet.headline
     (one,) = fleet.flagged
     assert (one.gear, one.quantities) == ("D", {"stiffness": 0.99})
@@ -59,7 +61,39 @@ def test_several_quantities_are_said_of_one_gear():
     assert "A has its zero at " in fleet.headline and " and has " in fleet.headline
     assert fleet.headline.endswith("1 more is flagged.")
     assert "--specimen A" in str(fleet.next_step)
-    assert fleet.headline.startswith("3 of 4 gears agree")
+    assert fleet.headline.startswith("3 of 4 gears scatter by ")
+
+
+@pytest.mark.parametrize(
+    ("scale", "words"),
+    [
+        (1e-6, "D has < 1 % of the stiffness of the others"),
+        (0.25, "D has 25 % of the stiffness of the others"),
+        (8.0, "D is 8 times as stiff as the others"),
+    ],
+)
+def test_a_broken_gear_is_described_in_plain_numbers(scale: float, words: str):
+    readings = four_gears()
+    fit = fitted(readings, {"D": ["stiffness"]})
+    for name in ("apart_percent", "apart_lo", "apart_hi"):
+        fit.gears.loc[3, name] = 100.0 * (scale - 1.0)
+    fleet = fleet_of(readings, fit)
+    assert words in fleet.headline and "itself of D" in str(fleet.next_step)
+
+
+def test_names_are_written_as_a_shell_and_a_table_take_them():
+    names = ("part 3", "0012", "=1+1", "Größe,\n7")
+    out = {"X": Finding("data.csv", "a force is missing", "state it", 7)}
+    readings = with_case(specimen_labels=names, left_out=out)
+    fleet = of(readings, {"part 3": ["noise"]})
+    assert "`--specimen 'part 3'`" in str(fleet.next_step)
+    frame = fleet.to_frame()
+    assert frame["gear"].tolist() == [*names, "X"]
+    text = columns_csv(dict(frame))
+    assert "'=1+1" in text and "false" in text
+    parquet = pd.read_parquet(io.BytesIO(frame_parquet(frame) or b""))
+    assert parquet["gear"].tolist() == [*names, "X"]
+    assert parquet["stiffness_N_per_mm"].isna().tolist() == [False] * 4 + [True]
 
 
 def test_lots_operators_and_rigs_are_in_the_answer():

@@ -15,6 +15,7 @@ from hdcal.data.measurements import parquet
 from hdcal.fleets.reading import parquet_readings
 from hdcal.fleets.reading.parquet_readings import BatchSums, senses
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
+from hdcal.fleets.reading.readings import RowSums, reading_vectors
 from hdcal.inference.distributions import moments
 
 
@@ -29,6 +30,23 @@ def labelled(**how) -> pd.DataFrame:
         date=[f"2026-04-{day + 1:02d}" for day in gear],
         temperature_C=20.0 + gear,
     )
+
+
+def test_sums_are_those_of_all_rows_and_of_joined_parts():
+    rng = np.random.default_rng(0)
+    index, part = np.sort(rng.integers(0, 5, 300)), np.sort(rng.integers(0, 40, 300))
+    x, sense, y = rng.normal(0.0, 1.0, (3, 300))
+    v = reading_vectors(x, sense, y)
+    whole = RowSums.of(index, v, x)
+    for k in range(5):
+        about = v[:, index == k] - v[:, index == k].mean(axis=1, keepdims=True)
+        assert whole.products[k] == pytest.approx(about @ about.T)
+        assert whole.lagged[k] == pytest.approx(about[:, 1:] @ about[:, :-1].T)
+    assert v[2] == pytest.approx(np.sign(x) * x**2)
+    (of_part, _), place = np.unique([index, part], axis=1, return_inverse=True)
+    joined = RowSums.of(place, v, x).joined(of_part)
+    for name, theirs in vars(whole).items():
+        assert getattr(joined, name) == pytest.approx(theirs), name
 
 
 def test_sums_count_the_modulus_and_mirror_gears_that_were_pulled():
@@ -67,7 +85,7 @@ def test_batches_come_to_what_all_rows_come_to(tmp_path, monkeypatch, batch, mix
     by_gear = frame.sort_values("gear", kind="stable", ignore_index=True)
     whole = read_fleet(by_gear, SIZES)
     if mixed:
-        names = "rows", "mean", "products", "reach"
+        names = "rows", "mean", "products", "lagged", "reach"
         for name in names:
             mine, theirs = (getattr(each.sums, name) for each in (found, whole))
             assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-9)

@@ -147,6 +147,7 @@ def test_fewer_than_three_that_are_left_are_refused():
     ("gears", "scatter", "apart", "found"),
     [
         (10, 0.0, 0.05, True),
+        (10, 0.003, 0.2, True),
         (100, 0.003, 0.1, True),
         (100, 0.003, 0.0, False),
         (10, 0.0, 0.005, False),
@@ -171,6 +172,8 @@ def test_gains_of_rigs_are_no_two_parts():
     rows.gain = np.tile([0.0, 0.3], (12, 1))
     rows.labels = {"rigs": ["A", "B"] * 12}
     assert not faults_among_gears(rows.readings(rng))
+    rows.gain[2] = rows.gain[2, ::-1]
+    assert [*faults_among_gears(rows.readings(rng))] == ["G2"]
 
 
 def test_regular_records_fail_as_rarely_as_stated():

@@ -16,7 +16,7 @@ from hdcal.evidence.search import search
 from hdcal.physics.registry import EFFECTS
 from hdcal.shared_causes import gear_evidence
 from hdcal.shared_causes.gear_evidence import Weight, by_cause, weigh_gear
-from hdcal.shared_causes.gears import usable_gears
+from hdcal.shared_causes.gears import read_gears, usable_gears
 from hdcal.shared_causes.result import FleetCauses
 
 LIBRARY = {
@@ -24,7 +24,7 @@ LIBRARY = {
     for name in ("coulomb_friction", "large_deflection", "run_offset")
 }
 FRICTION = {"coulomb_friction": LIBRARY["coulomb_friction"]}
-WITH_LOOP = ("G1", "G2", "G3", "G4")
+WITH_LOOP = ("G 1", "G2", "G3", "G4")
 GEARS = (*WITH_LOOP, "G5", "G6", "G7")
 
 
@@ -51,7 +51,7 @@ def with_loop():
 
 @pytest.fixture(scope="module")
 def one_gear():
-    return usable_gears(hdcal.read_case(fleet(0.8)))[0]["G1"]
+    return usable_gears(read_gears(fleet(0.8)))[1]["G 1"]
 
 
 def causes_of(found: FleetCauses) -> list[tuple[str, ...]]:
@@ -134,12 +134,23 @@ def weighed(gear, library, seed: int):
 
 
 def spoiled(table: pd.DataFrame, how: str) -> pd.DataFrame:
-    """Return the table with few rows, no scatter or a word in gear G5."""
+    """Return the table with a fault in gear G5."""
     bad, force = table.specimen == "G5", table.force_N
     if how == "few rows":
         return table[~bad | (table.index % 12 == 0)]
     if how == "no scatter":
         return table.assign(force_N=force.where(~bad, 9 * table.deformation_mm))
+    if how == "kN":
+        force = force.where(~bad, force / 1000.0)
+    if how == "opposite":
+        force = force.where(~bad, -force)
+    if how == "dead":
+        force = force.where(~bad, 0.1)
+    if how == "stuck":
+        force[table.index[bad][15:23]] = force[table.index[bad][15]]
+        force[table.index[bad][38:]] = force[table.index[bad][38]]
+    if how == "drop":
+        force[table.index[bad][9:23]] -= 30.0
     if how == "a word":
         force = force.astype(object)
         force[table.index[bad][3]] = "broken"
@@ -152,7 +163,10 @@ def failing(gear, library, seed: int):
     return weighed(gear, library, seed)
 
 
-@pytest.mark.parametrize("how", ["few rows", "no scatter", "a word", "evidence"])
+FAULTS = "few rows", "no scatter", "a word", "kN", "opposite", "dead", "stuck", "drop"
+
+
+@pytest.mark.parametrize("how", [*FAULTS, "evidence"])
 def test_a_bad_gear_is_named_and_left_out_when_asked(monkeypatch, how: str):
     weigh = failing if how == "evidence" else weighed
     monkeypatch.setattr("hdcal.shared_causes.causes.weigh_gear", weigh)
@@ -163,6 +177,7 @@ def test_a_bad_gear_is_named_and_left_out_when_asked(monkeypatch, how: str):
     assert tuple(found.to_frame().gear) == (*(g for g in GEARS if g != "G5"), "G5")
     assert [*found.left_out] == ["G5"] and found.gears == 6
     assert causes_of(found)[:4] == [("coulomb_friction",)] * 4
+    assert "`--specimen 'G 1'`" in str(found.next_step)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +192,7 @@ def test_a_failed_evidence_is_a_finding(monkeypatch, one_gear, part, result):
 
     monkeypatch.setattr(gear_evidence, part, broken)
     found = weigh_gear(one_gear, FRICTION, 0)
-    assert isinstance(found, Finding) and "'G1'" in found.file
+    assert isinstance(found, Finding) and "'G 1'" in found.file
 
 
 def test_the_command_answers_and_writes_its_table(here: Hdcal, tmp_path, monkeypatch):
@@ -199,7 +214,7 @@ def test_the_command_answers_and_writes_its_table(here: Hdcal, tmp_path, monkeyp
 
 def test_bad_requests_are_one_finding_each(here: Hdcal, tmp_path):
     table = fleet(0.8)
-    table[table.specimen == "G1"].to_csv(tmp_path / "line.csv", index=False)
+    table[table.specimen == "G 1"].to_csv(tmp_path / "line.csv", index=False)
     done = here("causes", "line.csv", "--library", "all", "--jobs", 0)
     assert done.returncode == 2
     assert "3 or more" in done.stderr

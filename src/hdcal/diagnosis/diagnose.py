@@ -155,7 +155,9 @@ def _how_far(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> HowFar:
-    closed = closed_on_left_out(searched, fit, names, rng) if names else None
+    closed, word = None, ""
+    if names:
+        closed, word = closed_on_left_out(searched, fit, names, rng)
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():
         if name != OUTSIDE or len(fit.rms) > 1:
@@ -165,7 +167,7 @@ def _how_far(
     wild = fit.noise.name == OUTLIERS
     noise = "noise without wild readings" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
-    return HowFar(ladder=tuple(ladder), closed=closed)
+    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

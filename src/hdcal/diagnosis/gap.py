@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from hdcal.data.records import Records
 from hdcal.evidence.components import Components, components
@@ -12,13 +12,16 @@ from hdcal.evidence.evaluation import select
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import Part, join, posterior, sampled_curves
-from hdcal.evidence.row_features import place_in_run
+from hdcal.evidence.row_features import half_cycles, place_in_run
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.report.item import TAILS, Interval
 
-# Draws of the gap, and of the share that closes; blocks of rows that are left out.
-_DRAWS, _SAMPLES, _BLOCKS = 600, 1000, 6
+# Draws of the gap, and of the share that closes.
+_DRAWS, _SAMPLES = 600, 1000
+# With fewer half cycles all rows are cut into stretches, six at most.
+_FEWEST_HALVES, _MOST_STRETCHES = 4, 6
 
 
 @dataclass(frozen=True)
@@ -95,20 +98,19 @@ def fitted(
 
 def closed_on_left_out(
     searched: Searched, fit: Fitted, names: Sequence[str], rng: np.random.Generator
-) -> Interval | None:
+) -> tuple[Interval | None, str]:
     """Return the share of the gap that effects close on rows left out of the fit.
 
-    A sixth of each run is left out at a time: nothing predicts a run, or a gear,
-    without any row of it. Base model and effects are fitted to the others, the shapes
-    of the effects included, with the noise of a fit to all. The share is 1 − √(G₁/G₀),
-    G the mean square of what is left beyond the noise; its interval is over resampled
-    blocks and the error of the noise sd. None where no block shows a gap.
+    The rows are left out block by block, in words what is returned too. Base model and
+    effects are fitted to the others, the shapes of the effects included, with the noise
+    of a fit to all. The share is 1 − √(G₁/G₀), G the mean square of what is left beyond
+    the noise; its interval is over resampled blocks and the error of the noise sd. None
+    where no block shows a gap.
     """
     problem = searched.problem
     effects = {name: searched.effects[name] for name in names}
-    order = np.argsort(place_in_run(problem.records.run), kind="stable")
-    block = np.empty(len(order), int)
-    block[order] = _BLOCKS * np.arange(len(order)) // len(order)
+    differ = any(issubclass(effect, Scatter) for effect in effects.values())
+    block, word = _blocks(problem.records, by_member=differ)
     library, rows = components(effects, problem), np.bincount(block).astype(float)
     count = len(rows)
     table = np.array([_errors(problem, library, fit, block == k) for k in range(count)])
@@ -122,13 +124,29 @@ def closed_on_left_out(
     # end does without it.
     careful = _closed(before - off, after + spread - off)
     if np.isfinite(closed).mean() < 0.5:
-        return None
+        return None, word
     whole = rows @ table / rows.sum()
     middle = float(_closed(whole[0], whole[1]))
     middle = float(np.nanmedian(closed)) if np.isnan(middle) else middle
     low, high = np.nanquantile(careful, TAILS[0]), np.nanquantile(closed, TAILS[2])
     low, high = min(float(low), middle), max(float(high), middle)
-    return Interval(median=middle, lo=low, hi=high)
+    return Interval(median=middle, lo=low, hi=high), word
+
+
+def _blocks(records: Records, *, by_member: bool) -> tuple[Int[np.ndarray, " n"], str]:
+    """Return the block of each row, and the word for a block.
+
+    Where members differ nothing predicts one without any row of it.
+    """
+    if by_member:
+        quarter = np.clip((place_in_run(records.run) + 1.0) * 2.0, 0, 3)
+        return quarter.astype(int), "a quarter of each run"
+    halves, rows = half_cycles(records), len(records.run)
+    if halves[-1] + 1 < _FEWEST_HALVES:
+        halves = np.clip(rows // 3, 2, _MOST_STRETCHES) * np.arange(rows) // rows
+        return halves, "a stretch of rows"
+    whole = "unloading" in records.known
+    return halves, "a half cycle" if whole else "a stretch of rows"
 
 
 def _closed(before, after):

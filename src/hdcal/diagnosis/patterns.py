@@ -68,8 +68,8 @@ class Seen(Item):
 class Contrast:
     """One pattern that readings may have, and a statement with {way} and {size}.
 
-    `ways` are the words for a positive and a negative coefficient. The size is the
-    swing of the column, off a straight line over the stroke if `off_line`.
+    `ways` are the words for a positive and a negative coefficient. The size is a share
+    of the swing of the column, off a straight line over the stroke if `off_line`.
     """
 
     covariate: str
@@ -77,26 +77,29 @@ class Contrast:
     ways: tuple[str, str]
     words: str
     off_line: bool = True
+    share: float = 1.0
 
     def swing(self, x: np.ndarray) -> float:
-        """Return the difference of the highest and the lowest place of the column."""
+        """Return the share of the distance from the lowest to the highest place."""
         column = self.column
         if self.off_line:
             column = column - np.polyval(np.polyfit(x, column, 1), x)
-        return float(np.ptp(column))
+        return self.share * float(np.ptp(column))
 
 
 def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
     side, depth = np.sign(x) if both else np.ones_like(x), np.abs(x)
-    place = "deformation"
+    # Through zero a curve swings to both sides; its size is that of one.
+    place, share = "deformation", 0.5 if both else 1.0
     words = "the curve {way} with the {displacement}, {size} off a straight line"
-    yield Contrast(place, side * depth**2, ("stiffens", "softens"), words)
+    bend = side * depth**2
+    yield Contrast(place, bend, ("stiffens", "softens"), words, share=share)
     words = "at small {displacement}s the {load} lies {size} too {way}"
     toe = side * np.maximum(_TOE - depth, 0.0)
-    yield Contrast(place, toe, ("high", "low"), words, False)
+    yield Contrast(place, toe, ("high", "low"), words, False, share)
     words = "at the largest {displacement}s the {load} turns {way} by {size}"
     head = side * np.maximum(depth - _HEAD, 0.0)
-    yield Contrast(place, head, _UP, words, False)
+    yield Contrast(place, head, _UP, words, False, share)
 
 
 def _over_direction(

@@ -53,11 +53,12 @@ class HowFar(Item):
     """How far the gap closes, from the formula alone down to the noise.
 
     `closed` is the share that the acting effects close on rows that they were not
-    fitted to, None without any.
+    fitted to, None without any; `left_out` is what was left out of each fit.
     """
 
     ladder: tuple[Rung, ...]
     closed: Interval | None
+    left_out: str
 
     @property
     def share(self) -> str:

@@ -8,6 +8,7 @@ body is for the page).
 """
 
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from typing import Any
@@ -66,6 +67,7 @@ def _environment(plain: bool) -> Environment:
         unit,
     )
     environment.filters |= {function.__name__: function for function in filters}
+    environment.filters["argument"] = shlex.quote
     return environment
 
 

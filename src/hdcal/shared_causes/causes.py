@@ -8,7 +8,7 @@ import pandas as pd
 
 from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.cli.processes import run_all
-from hdcal.data.case import Case, require_force
+from hdcal.data.case import Case
 from hdcal.data.measurements.bad_gears import cause as fault
 from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.plausible import implausible
@@ -17,6 +17,7 @@ from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings
 from hdcal.evidence.table import OUTSIDE
+from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
@@ -61,8 +62,8 @@ def causes(
         columns: as in `read_case`.
         library: effects to consider, by name; by default all of them.
         jobs: processes that share the gears.
-        skip_bad: leave out gears with a wrong row, with too few readings, or whose
-            evidence fails.
+        skip_bad: leave out gears with a fault, with too few readings, or whose evidence
+            fails.
         seed: of all random numbers.
         progress: called with (gears done, gears in all).
 
@@ -74,10 +75,23 @@ def causes(
         wrong += implausible("seed", seed)
         effects = wrong.attempt(library_of, library)
     assert effects is not None
-    case = read_gears(data, gear, columns=columns, skip_bad=skip_bad)
-    require_force(case, "causes")
+    readings = read_gears(data, gear, columns=columns)
+    how = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed, "progress": progress}
+    return causes_of(readings, effects, **how)
+
+
+def causes_of(
+    readings: FleetReadings,
+    effects: Mapping[str, type[Effect]],
+    *,
+    jobs: int,
+    skip_bad: bool,
+    seed: int,
+    progress: Progress | None,
+) -> FleetCauses:
+    """Return the result for readings; the arguments are those of `causes`."""
+    case, gears, left_out = usable_gears(readings, skip_bad=skip_bad)
     check_effect_priors(case, {**EFFECTS, **effects})
-    gears, left_out = usable_gears(case, skip_bad=skip_bad)
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
     tasks = [(each, effects, seed) for each in gears.values()]
     weights = dict(zip(gears, run_all(weigh_gear, tasks, jobs, progress), strict=True))

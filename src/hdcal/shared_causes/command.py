@@ -47,18 +47,17 @@ def causes(console: Console, out, force, seed, library, jobs, skip_bad, **given)
         effects = wrong.attempt(choose_library, library)
         if gear_files(given["data"]):
             wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
-            del given["sheet"], given["specimen"]
-        case = None
+        readings = None
         if given["columns"] is not None:
-            case = wrong.attempt(read_gears, **given, skip_bad=skip_bad)
-        if case is not None:
-            wrong.attempt(usable_gears, case, skip_bad=skip_bad)
-            out = f"{case.name}-causes" if out is None else out
+            readings = wrong.attempt(read_gears, **given)
+        if readings is not None:
+            wrong.attempt(usable_gears, readings, skip_bad=skip_bad)
+            out = f"{readings.case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
-    assert case is not None and effects is not None
-    from hdcal.shared_causes.causes import causes as shared_causes
+    assert readings is not None and effects is not None
+    from hdcal.shared_causes.causes import causes_of
 
     asked = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed}
     with progress_bar("weighing") as progress:
-        found = shared_causes(case, library=effects, progress=progress, **asked)
+        found = causes_of(readings, effects, progress=progress, **asked)
     return console.show(found, tables={"gears.csv": found.to_frame()})

@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.case import Case, require_force
 from hdcal.data.gear import at_full_scale
 from hdcal.data.measurements.bad_gears import offer
-from hdcal.data.measurements.folder import read_gear_folder
-from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.prior import scale_of
-from hdcal.data.reading import read_case
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.row_features import take_rows
+from hdcal.fleets.reading.read_fleet import read_fleet, usable
+from hdcal.fleets.reading.readings import FleetReadings
 
 # Frequencies of causes need several gears.
 _FEWEST = 3
@@ -23,31 +22,35 @@ _FEWEST = 3
 _FEWEST_LEFT = 8
 
 
-def read_gears(data: Any, gear: Any = None, **how: Any) -> Case:
-    """Return the readings of many gears, as `causes` takes them.
+def read_gears(data: Any, gear: Any = None, **how: Any) -> FleetReadings:
+    """Return the readings of many gears, read and screened as those of a fleet.
 
     Raises:
-        InputError: holds everything that is wrong with the data.
+        InputError: holds everything that is wrong with the data as a whole.
     """
-    if isinstance(data, Case):
-        return data
-    if gear_files(data):
-        return read_gear_folder(data, gear, **how)[0]
-    return read_case(data, gear, **how)
+    readings = read_fleet(data, gear, all_rows=True, **how)
+    require_force(readings.case, "causes")
+    return readings
 
 
 def usable_gears(
-    case: Case, *, skip_bad: bool = False
-) -> tuple[dict[str, Case], dict[str, Finding]]:
-    """Return a case for each gear, by its label, and the fault of each gear left out.
+    readings: FleetReadings, *, skip_bad: bool = False
+) -> tuple[Case, dict[str, Case], dict[str, Finding]]:
+    """Return the readings that can show a cause.
+
+    Returns:
+        The case of all gears, a case for each, by its label, and the fault of each gear
+        that is left out.
 
     Raises:
         InputError: too few gears are left, or a gear cannot be used.
     """
+    case = usable(readings, skip_bad=skip_bad).case
     gears = {gear: _one_gear(case, k) for k, gear in enumerate(case.specimen_labels)}
     faults = {label: _fault(gear) for label, gear in gears.items()}
     bad = {label: fault for label, fault in faults.items() if fault is not None}
-    return without_bad(gears, bad, skip_bad=skip_bad), {**case.left_out, **bad}
+    left = without_bad(gears, bad, skip_bad=skip_bad)
+    return case, left, {**case.left_out, **bad}
 
 
 def without_bad(

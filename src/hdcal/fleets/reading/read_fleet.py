@@ -50,17 +50,19 @@ def read_fleet(
     sheet: str | None = None,
     specimen: str | None = None,
     scheduler: str | None = None,
+    all_rows: bool = False,
     **how: Any,
 ) -> FleetReadings:
     """Return the readings of many gears; gears with a fault are named in its `faults`.
 
     The data are those of `hdcal.fleet`, all else but the Dask scheduler is as in
-    `read_case`.
+    `read_case`. Of Parquet files the case has the first rows only, unless all are asked
+    for.
 
     Raises:
         InputError: holds what is wrong with the data as a whole.
     """
-    if is_parquet(data):
+    if is_parquet(data) and not all_rows:
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
         return _with_faults(found, sums.left_out, sums.observed)
     if scheduler is not None:

@@ -27,6 +27,7 @@ class RowSums:
         mean: of v, shape (p, 4).
         products: sum of (v − mean)(v − mean)ᵀ, shape (p, 4, 4).
         lagged: sum of (v_t − mean)(v_{t−1} − mean)ᵀ over successive rows.
+        first: v of the first row, as `last` is of the last one, shape (p, 4).
         low: smallest deformation, as `high` is the largest, shape (p,) [mm].
     """
 
@@ -34,6 +35,8 @@ class RowSums:
     mean: np.ndarray
     products: np.ndarray
     lagged: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
     low: np.ndarray
     high: np.ndarray
 
@@ -56,8 +59,16 @@ class RowSums:
         for i, row in enumerate(about):
             products[:, i] = np.add.reduceat(row * about, start, axis=1).T
             lagged[:, i] = np.add.reduceat(row * before, start, axis=1).T
-        low, high = np.minimum.reduceat(read, start), np.maximum.reduceat(read, start)
-        return RowSums(rows.astype(float), mean.T, products, lagged, low, high)
+        return RowSums(
+            rows.astype(float),
+            mean.T,
+            products,
+            lagged,
+            v[:, start].T,
+            v[:, start + rows - 1].T,
+            np.minimum.reduceat(read, start),
+            np.maximum.reduceat(read, start),
+        )
 
     @property
     def reach(self) -> np.ndarray:
@@ -71,21 +82,32 @@ class RowSums:
     def joined(self, index: np.ndarray) -> "RowSums":
         """Return the sums of wholes whose parts these are, in the order of the rows.
 
-        The index is that of the whole of each part, 0, 1, … without a gap. Successive
-        rows of different parts are left out of `lagged`.
+        The index is that of the whole of each part, 0, 1, … without a gap.
         """
         order = np.argsort(index, kind="stable")
         parts, whole = self.where(order), index[order]
         start = np.searchsorted(whole, np.arange(1 + whole.max()))
+        end = np.append(start[1:], len(whole)) - 1
         rows, each = np.add.reduceat(parts.rows, start), parts.rows[:, None]
         mean = np.add.reduceat(each * parts.mean, start) / rows[:, None]
-        shift = parts.mean - mean[whole]
+        middle = mean[whole]
+        shift, first, last = (
+            place - middle for place in (parts.mean, parts.first, parts.last)
+        )
         between = each[..., None] * _outer(shift, shift)
+        # Without the first row of a part its rows have another mean; likewise the last.
+        lagged = parts.lagged + between + _outer(shift - first, shift)
+        lagged -= _outer(shift, last)
+        # The first row of a part follows the last one of the part before.
+        later = np.setdiff1d(np.arange(len(whole)), start)
+        lagged[later] += _outer(first[later], last[later - 1])
         return RowSums(
             rows,
             mean,
             np.add.reduceat(parts.products + between, start),
-            np.add.reduceat(parts.lagged + between, start),
+            np.add.reduceat(lagged, start),
+            parts.first[start],
+            parts.last[end],
             np.minimum.reduceat(parts.low, start),
             np.maximum.reduceat(parts.high, start),
         )
@@ -99,6 +121,8 @@ class RowSums:
             mean=scale * self.mean,
             products=_outer(scale, scale) * self.products,
             lagged=_outer(scale, scale) * self.lagged,
+            first=scale * self.first,
+            last=scale * self.last,
             low=factor * self.low,
             high=factor * self.high,
         )
@@ -213,8 +237,9 @@ def readings_of(
     """Return readings; gears, which ascend, and runs are those of mountings, (m,)."""
     side = loading_side(np.array([sums.low.min(), sums.high.max()])) or 1
     # All components of v are odd in the deformation.
-    each = {**vars(sums), "mean": side * sums.mean}
-    return FleetReadings(case, MountingSums(**each, gear=gear, run=run), side)
+    each = {name: side * getattr(sums, name) for name in ("mean", "first", "last")}
+    found = MountingSums(**{**vars(sums), **each}, gear=gear, run=run)
+    return FleetReadings(case, found, side)
 
 
 def modulus_left(gear: Gear, temperature):

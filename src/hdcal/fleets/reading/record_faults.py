@@ -34,8 +34,8 @@ _TIMES, _SHARE, _ALIKE = 5.0, 0.01, 3.0
 # Probability that one of all gears without a fault is taken for two parts, degrees of
 # freedom of the tails of their scatter, and a difference that the rig may make.
 _TWO_PARTS, _TAILS, _SAME = 1e-3, 8.0, 2.0 * MACHINE_CLASS
-# Correlation of neighbours that is taken into account at most.
-_MOST_ALIKE = 0.99
+# Correlation of neighbours that is taken into account at most; sweeps of the polish.
+_MOST_ALIKE, _SWEEPS = 0.99, 5
 # Probability of each of two tests that a regular record fails it.
 _IRREGULAR = 2e-3
 
@@ -153,23 +153,24 @@ def _no_curve(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
 
 
 def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
-    """Yield gears whose mountings on one rig differ far more than those of other gears.
+    """Yield gears whose mountings differ far more than those of other gears.
 
     The scatter of mountings is a robust estimate from n differences, in addition to
     their errors. The median of n has the tails of (n + 1)/2 degrees of freedom.
     """
     case = readings.case
     table: Any = _log_stiffness(sums.where(sums.products[:, 0, 0] > 0.0))
-    rig = np.array(case.rigs)[table["run"]] if case.rigs else 0
-    table = table.assign(rig=rig).sort_values("place")
-    table["count"] = table.groupby(["gear", "rig"])["place"].transform("size")
+    table["count"] = table.groupby("gear")["place"].transform("size")
     table = table[table["count"] > 1]
     if table.empty:
         return
-    ends = table.groupby(["gear", "rig"])
+    if case.rigs:
+        rig = np.array(case.rigs)[table["run"]]
+        table = table.assign(place=table["place"] - _gains(table, rig))
+    ends = table.sort_values("place").groupby("gear")
     low, high, many = ends.first(), ends.last(), ends.size().to_numpy()
     # Bessel's correction of the deviations from the mean of a gear.
-    off = table["place"] - ends["place"].transform("mean")
+    off = table["place"] - table.groupby("gear")["place"].transform("mean")
     off *= np.sqrt(table["count"] / (table["count"] - 1.0))
     own = robust_sd(off.to_numpy()) ** 2 - float(table["variance"].median())
     variance = low["variance"] + high["variance"] + 2.0 * max(own, 0.0)
@@ -182,7 +183,7 @@ def _two_parts(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
             case.run_labels[end["run"].iloc[index]] for end in (low, high)
         )
         yield (
-            low.index[index][0],
+            low.index[index],
             f"mounting {stiffer} is {100.0 * np.expm1(gap[index]):.2g} % stiffer than "
             f"{softer}, and mountings of other gears differ by {usual:.2g} % (sd): two "
             "parts under one label",
@@ -199,3 +200,13 @@ def _log_stiffness(sums: MountingSums) -> pd.DataFrame:
     noise = np.maximum(fits.sd, np.median(fits.sd)) ** 2 * (1 + alike) / (1 - alike)
     columns = {"place": np.log(pull / square), "variance": noise * square / pull**2}
     return pd.DataFrame({"gear": sums.gear, "run": sums.run} | columns)
+
+
+def _gains(table: pd.DataFrame, rig: np.ndarray) -> np.ndarray:
+    """Return the log gain of the rig of each mounting, by median polish."""
+    gain = np.zeros(len(table))
+    for _ in range(_SWEEPS):
+        off = table["place"] - gain
+        off -= off.groupby(table["gear"]).transform("median")
+        gain += off.groupby(rig).transform("median").to_numpy()
+    return gain
