@@ -189,6 +189,10 @@ def _force(
 
 def _knows_contact(posterior: Posterior) -> bool:
     """Return whether the origin may be first contact, or the gear file states that."""
-    name = "deformation_offset"
-    stated = posterior.priors[name].source != rig_priors()[name].source
+    stated = is_stated(posterior, "deformation_offset")
     return stated or not lies_far(posterior.case.records)
+
+
+def is_stated(posterior: Posterior, zero: str) -> bool:
+    """Return whether the prior of a zero is another than the shipped one."""
+    return posterior.priors[zero].source != rig_priors()[zero].source
