@@ -31,6 +31,7 @@ from hdcal.prediction.joint import JointModel
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.report.item import Count, Draws, Item
 from hdcal.report.item import quantity as labelled
+from hdcal.report.words import digits
 
 Rule = Literal["guarded", "simple"]
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -179,7 +180,7 @@ def _force(
         words = f"{force:g} {unit} is no {units.load}"
         yield Finding(name, words, f"Give a number of {unit}")
     elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
-        words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
+        words = f"{force:g} {unit}, where {place} takes about {digits(usual, 3)} {unit}"
         yield Finding(name, words, f"Give it in {unit}")
     elif name == "limit_force" and force < 0.0 < loading:
         words = f"{force:g} {unit} is no limit of the {units.load} at {place}, "
