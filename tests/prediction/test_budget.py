@@ -15,6 +15,7 @@ from posteriors import (
 )
 
 import hdcal
+from hdcal.data.priors import Prior
 
 
 def exact(size: int = 400, sigma: float = 1.5):
@@ -118,3 +119,44 @@ def test_certificates_are_inputs_of_a_load_with_their_sensitivities():
         assert row.type_ == "B" and row.distribution == "normal"
         assert row.standard_uncertainty == pytest.approx(SDS[site], rel=0.05)
         assert row.sensitivity_N_per_unit == pytest.approx(slope, rel=0.15)
+
+
+def with_zeros(contact_sd: float, **stated: Prior):
+    """Return a gear whose reading at 0.4 mm is known, and of both zeros the sum."""
+    case, rng = ramp_case(), np.random.default_rng(4)
+    case = replace(case, gear=replace(case.gear, priors=case.gear.priors | stated))
+    draws = plain_draws(case)
+    contact = rng.normal(0.0, contact_sd, len(draws["K"]))
+    gauge = -1.0 - 0.4 * (draws["stiffness"] - 205.0) + draws["stiffness"] * contact
+    zeros = {"deformation_offset": contact, "force_offset": gauge}
+    known = written_posterior(case, draws | zeros)
+    driven = "force_offset" if stated else "deformation_offset"
+    by_prior = {driven: replace(known.diagnoses["alpha"], driven_by="prior")}
+    return replace(known, diagnoses=known.diagnoses | by_prior)
+
+
+def test_an_unstated_zero_of_a_load_is_that_of_first_contact():
+    found = hdcal.margin(with_zeros(0.02), 0.4, quantity="load")
+    check(found)
+    rows = by_component(found)
+    contact, gauge = rows["place of first contact"], rows["zero of the force gauge"]
+    assert (contact.type_, contact.unit, contact.distribution) == ("B", "mm", "prior")
+    assert contact.standard_uncertainty == pytest.approx(0.02, rel=0.05)
+    assert contact.sensitivity_N_per_unit == pytest.approx(-205.0, rel=0.05)
+    assert contact.share == found.budget[0].share > 0.9
+    assert gauge.type_ == "A"
+    assert gauge.standard_uncertainty == pytest.approx(0.4 * 1.5, rel=0.1)
+    assert gauge.sensitivity_N_per_unit == pytest.approx(-1.0, rel=0.1)
+    assert "Read the gauge" in found.lines("next_step")[0]
+
+
+def test_a_stated_zero_is_not_asked_for_again():
+    zero = Prior("normal", (0.0, 2.0), "N", "read out of contact")
+    stated = with_zeros(0.01, force_offset=zero)
+    found = hdcal.margin(stated, 0.4, quantity="load")
+    assert found.budget[0].component == "zero of the force gauge"
+    assert found.budget[0].type_ == "B"
+    assert not found.lines("next_step")
+    short = hdcal.margin(stated, 0.4, quantity="load", limit_force=80.0)
+    advice = short.lines("next_step")[0]
+    assert "Provide a capacity" in advice and "Read the gauge" not in advice

@@ -15,6 +15,7 @@ from hdcal.report.charts.chart_spec import Chart, Line, Panel
 from hdcal.report.item import Draws, Interval, Item, quantity
 from hdcal.report.result import Result
 from hdcal.report.table_files import columns_csv
+from hdcal.report.words import digits, number
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"
 BODY = """\
@@ -175,3 +176,22 @@ def test_numbers_stay_whole_in_a_narrow_terminal(long: str):
     wide = Interval(median=-12345.6, lo=-12345.7, hi=-12345.5)
     row = found.rows[0].model_copy(update={"force_N": wide})
     assert "-12345.60" in found.model_copy(update={"rows": (row,)}).text(width=40)
+
+
+@pytest.mark.parametrize(
+    ("value", "count", "text"),
+    [
+        (498.2, 2, "498"),
+        (480.0, 2, "480"),
+        (99.6, 2, "100"),
+        (8.43, 2, "8.4"),
+        (0.0412, 2, "0.041"),
+        (-12345.6, 3, "-12346"),
+        (1234.5, 4, "1234"),
+        (2.5e7, 2, "2.5e+07"),
+        (np.nan, 2, "nan"),
+    ],
+)
+def test_everyday_numbers_have_no_exponent(value: float, count: int, text: str):
+    assert digits(value, count) == text
+    assert number(20_660.0) == "20660" and number(209.3).endswith("209.3")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hdcal.report.charts import chart_spec as spec
+from hdcal.report.words import digits
 
 if TYPE_CHECKING:
     from hdcal.design.inverse_design import InverseDesign
@@ -65,7 +66,7 @@ def balance_chart(result: "WaveGenerator") -> spec.Chart:
         bands.append(sense * np.quantile(forces, _TAILS, axis=1))
         marks += _band(f"gear at {level:g} °C, 95 %", x, bands[-1], colour)
     force = spring.rate_N_per_mm * (spring.interference_mm - x)
-    name = f"spring of {spring.rate_N_per_mm:.4g} N/mm"
+    name = f"spring of {digits(spring.rate_N_per_mm, 4)} N/mm"
     marks.append(spec.Line(label=name, x=x, y=force, colour=spec.INK, dash="dashed"))
     panel = spec.Panel(
         title="Balance of spring and gear",

@@ -26,6 +26,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.prediction.models import Models
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, Probability, quantity
+from hdcal.report.words import digits
 
 # A limit this many times larger or smaller than the force is a slip of the unit.
 _OFF = 100.0
@@ -57,7 +58,8 @@ class LimitAsked(request.Asked):
             return limit
         usual = abs(np.median(gears.forces([at], [gears.gear.reference_temperature])))
         if limit < 0.0 < at or not usual / _OFF <= abs(limit) <= usual * _OFF:
-            words = f"{limit:g} N is no limit where {at:g} mm takes about {usual:.3g} N"
+            words = f"{limit:g} N is no limit where {at:g} mm takes about "
+            words += f"{digits(usual, 3)} N"
             raise fault(words, "Give it in N, with the sign of the deformation")
         return abs(limit)
 
@@ -251,6 +253,6 @@ def inverse_design(
 def _unmet(best: Candidate, asked: LimitAsked) -> Finding:
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
     words = f"nothing keeps {asked.limit_force_N:g} N: {at} gives "
-    words += f"{best.force_kept_N:.4g} N at {best.stress_MPa.median:.3g} MPa"
+    words += f"{digits(best.force_kept_N, 4)} N at {best.stress_MPa.median:.3g} MPa"
     remedy = "Widen the bounds, free another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

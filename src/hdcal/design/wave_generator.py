@@ -26,6 +26,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.prediction.models import Models
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Interval, Item, Probability, quantity
+from hdcal.report.words import digits
 
 # Range of the spring rate, relative to the stiffness of the gear.
 RATE_RANGE = (0.01, 100.0)
@@ -247,8 +248,8 @@ def _require_growing(forces: np.ndarray) -> None:
 
 def _unmet(springs: Sequence[Spring], required: float) -> Finding:
     best, (soft, *_, stiff) = max(springs, key=lambda each: each.probability), springs
-    words = f"no spring rate between {soft.rate_N_per_mm:.4g} and "
-    words += f"{stiff.rate_N_per_mm:.4g} N/mm keeps it with probability {required:g}: "
-    words += f"the best is {best.rate_N_per_mm:.4g} N/mm with {best.probability:.4g}"
+    low, high, at = (digits(each.rate_N_per_mm, 4) for each in (soft, stiff, best))
+    words = f"no spring rate between {low} and {high} N/mm keeps it with probability "
+    words += f"{required:g}: the best is {at} N/mm with {best.probability:.4g}"
     remedy = "Widen the window, narrow the temperatures or build the set point closer"
     return Finding("window", words, remedy)

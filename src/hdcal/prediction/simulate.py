@@ -23,8 +23,9 @@ SCORES = ("gear", "mounting", "law", "bend", "zero_drift", "frame_drift")
 # Certified errors of gauges: inputs of their own, where a load is asked for.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
 # Parameters that are inputs of their own where the prior determines them; the zero of
-# the gauge is one of every load.
-SEPARATE = ("alpha", "force_offset")
+# the gauge is one of every load. Readings show the sum of both zeros: what the prior
+# of first contact leaves open of it is its part.
+SEPARATE = ("alpha", "deformation_offset", "force_offset")
 
 
 def simulate(

@@ -18,7 +18,16 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.errors import printable
-from hdcal.report.words import capital, hypothesis, label, load, number, percent, unit
+from hdcal.report.words import (
+    capital,
+    digits,
+    hypothesis,
+    label,
+    load,
+    number,
+    percent,
+    unit,
+)
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -57,6 +66,7 @@ def _environment(plain: bool) -> Environment:
     filters = (
         capital,
         code,
+        digits,
         hypothesis,
         label,
         load,

@@ -49,13 +49,22 @@ def number(value: float | None, width: float | None = None) -> str:
     if not known(value):
         return "–"
     if not width or not math.isfinite(width) or width < _ROUNDING * abs(value):
-        return f"{value:.4g}"
+        return digits(value, 4)
     place = _place(width)
     if abs(value) >= 1e6 or place < -8:
-        digits = max(2, _place(value) - place + 2)
-        return f"{value:.{digits}e}"
+        decimals = max(2, _place(value) - place + 2)
+        return f"{value:.{decimals}e}"
     # z: a rounded zero has no sign.
     return f"{value:z.{max(0, 2 - place)}f}"
+
+
+def digits(value: float, count: int = 2) -> str:
+    """Return a number with so many significant digits; an integer keeps all of its own.
+
+    An uncertainty has two (GUM 7.2.6). Only from a million on it has an exponent.
+    """
+    whole = abs(value) < 1e6 and round(abs(value)) >= 10**count
+    return f"{value:.0f}" if whole else f"{value:.{count}g}"
 
 
 def _place(value: float) -> int:
@@ -123,9 +132,7 @@ def percent(share: float | None) -> str:
 
 
 def load(value: float | None, units: Quantities = FORCE) -> str:
-    """Return a force or torque with two digits, or as an integer from 10 on."""
+    """Return a force or torque with two significant digits."""
     if not known(value):
         return f"– {units.load_unit}"
-    rounded = float(f"{value:.2g}")
-    text = f"{value:.0f}" if abs(rounded) >= 10.0 else f"{rounded:g}"
-    return f"{text} {units.load_unit}"
+    return f"{digits(value)} {units.load_unit}"

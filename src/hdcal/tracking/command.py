@@ -28,14 +28,16 @@ def track(console: Console, known, alarm_rows):
     Each reading is answered at once by a line on standard output.
     """
     from hdcal.inference.model_average import load_models
+    from hdcal.report.words import digits
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
     tracker, bad = Tracker(load_models(known), alarm_rows=alarm_rows), 0
     mean, half = tracker.stiffness
     words = (
-        f"starts at {mean:.4g} ± {half:.2g} {tracker.units.stiffness_unit} (95 %) on a "
-        f"mounting that was not tested; one false alarm in {alarm_rows:g} readings"
+        f"starts at {digits(mean, 4)} ± {digits(half)} {tracker.units.stiffness_unit} "
+        f"(95 %) on a mounting that was not tested; one false alarm in {alarm_rows:g} "
+        "readings"
     )
     console.words("\n".join([words, *tracker.notes]))
     try:
@@ -48,7 +50,7 @@ def track(console: Console, known, alarm_rows):
     due = tracker.readings / alarm_rows
     console.words(
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
-        f"{due:.2g} false ones are due without a change"
+        f"{digits(due)} false ones are due without a change"
     )
     if tracker.alarms:
         words = "the answers remain those of the gear before a change, which raises "

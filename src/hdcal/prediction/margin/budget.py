@@ -13,6 +13,7 @@ import numpy as np
 
 from hdcal.prediction.joint import JointModel
 from hdcal.prediction.members import Members
+from hdcal.quantities import Quantities
 from hdcal.report.item import Item, Probability, Words, quantity
 
 # A correlation of this many standard errors, or less, may be chance in the draws: over
@@ -37,6 +38,7 @@ _INPUTS: dict[str, tuple[str, str, str, str]] = {
     "zero_drift": ("zero of the gauge with temperature", "N", "normal", ""),
     "frame_drift": ("frame of the rig with temperature", "mm", "normal", ""),
     "alpha": ("loss of modulus per kelvin", "1/K", "prior", ""),
+    "deformation_offset": ("place of first contact", "mm", "prior", ""),
     "force_offset": ("zero of the {load} gauge", "N", "posterior", "force_offset"),
     "force_gain": ("{load} gauge, certificate", "1", "normal", ""),
     "deformation_gain": ("displacement gauge, certificate", "1", "normal", ""),
@@ -71,24 +73,23 @@ def divided(
     Inputs take their part in the order given; `rest` names what none explains.
 
     Returns:
-        By name the variance of the input, its covariance with what the inputs before
-        it left of the output, and the part of the variance of the output. The parts
-        sum to that variance.
+        By name the variance that the inputs before it left of the input, its covariance
+        with what they left of the output, and the part of the variance of the output.
+        The parts sum to that variance.
     """
     left, basis = output - output.mean(), np.empty((len(output), 0))
     parts: dict[str, tuple[float, float, float]] = {}
     for name, values in inputs.items():
         centred = values - values.mean()
         column = centred - basis @ (basis.T @ centred)
-        size = np.linalg.norm(column)
+        size = float(np.linalg.norm(column))
         if not size > 1e-9 * np.linalg.norm(centred):
             continue
         axis = column / size
         along = float(axis @ left)
         if along**2 > _CHANCE**2 * (left @ left) / len(left):
             count = len(left)
-            tied = float(centred @ left) / count
-            parts[name] = float(np.var(values)), tied, along**2 / count
+            parts[name] = size**2 / count, size * along / count, along**2 / count
             basis, left = np.column_stack([basis, axis]), left - axis * along
     variance = float(np.var(left))
     return parts | {rest: (variance, variance, variance)}
@@ -124,6 +125,12 @@ def budget(
     listed = [_row(n, row, total, model, direction) for n, row in found.items()]
     ranked = sorted(listed, key=lambda row: -row.share)
     return tuple(ranked), direction * estimate, total**0.5
+
+
+def zero_words(units: Quantities) -> tuple[str, ...]:
+    """Return the components that a reading of the gauge out of contact determines."""
+    zeros = "deformation_offset", "force_offset"
+    return tuple(_INPUTS[name][0].format(load=units.load) for name in zeros)
 
 
 def _row(name: str, row, total: float, model: JointModel, direction: int) -> BudgetRow:

@@ -31,6 +31,7 @@ from hdcal.prediction.joint import JointModel
 from hdcal.prediction.sizes import check_tolerances
 from hdcal.report.item import Count, Draws, Item
 from hdcal.report.item import quantity as labelled
+from hdcal.report.words import digits
 
 Rule = Literal["guarded", "simple"]
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
@@ -179,7 +180,7 @@ def _force(
         words = f"{force:g} {unit} is no {units.load}"
         yield Finding(name, words, f"Give a number of {unit}")
     elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
-        words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
+        words = f"{force:g} {unit}, where {place} takes about {digits(usual, 3)} {unit}"
         yield Finding(name, words, f"Give it in {unit}")
     elif name == "limit_force" and force < 0.0 < loading:
         words = f"{force:g} {unit} is no limit of the {units.load} at {place}, "
@@ -189,6 +190,10 @@ def _force(
 
 def _knows_contact(posterior: Posterior) -> bool:
     """Return whether the origin may be first contact, or the gear file states that."""
-    name = "deformation_offset"
-    stated = posterior.priors[name].source != rig_priors()[name].source
+    stated = is_stated(posterior, "deformation_offset")
     return stated or not lies_far(posterior.case.records)
+
+
+def is_stated(posterior: Posterior, zero: str) -> bool:
+    """Return whether the prior of a zero is another than the shipped one."""
+    return posterior.priors[zero].source != rig_priors()[zero].source

@@ -7,11 +7,11 @@ import pandas as pd
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.margin.budget import BudgetRow
+from hdcal.prediction.margin.budget import BudgetRow, zero_words
 from hdcal.prediction.margin.charts import budget_chart, force_chart
 from hdcal.prediction.margin.levels import Conformity, Level
 from hdcal.prediction.margin.reached import Reached
-from hdcal.prediction.margin.request import MarginRequest, Share
+from hdcal.prediction.margin.request import MarginRequest, Share, is_stated
 from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import INTERVAL, Count, Item, Probability, Words
 from hdcal.report.item import quantity as labelled
@@ -87,6 +87,12 @@ class Margin(MarginRequest, Result):
         """Word for one member of the population."""
         is_load = self.quantity == "load" and self.population != "specimens"
         return "load" if is_load else _MEMBER[self.population]
+
+    @property
+    def is_zero_unread(self) -> bool:
+        """Whether a zero is the largest component, and nobody stated the gauge's."""
+        largest, stated = self.budget[0], is_stated(self.posterior, "force_offset")
+        return not stated and largest.component in zero_words(self.units)
 
     @property
     def facts(self) -> dict[str, str]:
