@@ -3,6 +3,7 @@
 Heavy imports stay inside the commands, so that `hdcal --help` answers at once.
 """
 
+import io
 import os
 import signal
 import sys
@@ -15,7 +16,7 @@ from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
 from hdcal.classical.command import fit
-from hdcal.cli.console import Console, discard_output
+from hdcal.cli.console import Console, discard
 from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command import design, study
@@ -68,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
-    sys.exit(code)
+    sys.exit(OUTPUT_CLOSED if code == DONE and console.unread else code)
 
 
 def _run(arguments: list[str], console: Console) -> int:
@@ -80,7 +81,7 @@ def _run(arguments: list[str], console: Console) -> int:
             _usage_error(error, console)
         else:
             # The message is the help.
-            error.show()
+            console.findings([], _text(error))
         return BAD_INPUT
     except InputError as error:
         console.findings(error.findings)
@@ -103,7 +104,7 @@ def _run(arguments: list[str], console: Console) -> int:
             words = f"the system refused: {what}"
             if error.filename is None:
                 # Standard output on a full disk.
-                discard_output()
+                discard(sys.stdout)
         else:
             words = f"internal error ({type(error).__name__}: {what}); please report "
             words += "it, with the output of HDCAL_DEBUG=1"
@@ -116,7 +117,15 @@ def _usage_error(error: click.UsageError, console: Console) -> None:
     command = error.ctx.command_path if error.ctx else "hdcal"
     problem = error.format_message().rstrip(".")
     found = Finding("command line", problem, f"See {command} --help")
-    console.findings([found], click.UsageError(ended(found.problem), error.ctx).show)
+    short = click.UsageError(ended(found.problem), error.ctx)
+    console.findings([found], _text(short))
+
+
+def _text(error: click.UsageError) -> str:
+    """Return what click would print."""
+    text = io.StringIO()
+    error.show(text)
+    return text.getvalue().rstrip()
 
 
 def _environment() -> dict[str, str]:

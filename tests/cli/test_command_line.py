@@ -126,16 +126,35 @@ def test_text_of_a_file_sends_no_control_characters(here: Hdcal, case: Path):
     assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
 
 
-def test_a_closed_pipe_or_a_full_disk_behind_the_output():
-    read, write = os.pipe()
-    os.close(read)
-    done = subprocess.run([*MAIN, "--help"], stdout=write, stderr=subprocess.PIPE)
-    os.close(write)
-    assert (done.returncode, done.stderr) == (141, b"")
+def test_a_full_disk_behind_the_output_is_one_line():
     if Path("/dev/full").exists():
         with Path("/dev/full").open("w") as full:
             done = run(*MAIN, "--help", stdout=full, stderr=subprocess.PIPE)
         assert done.returncode == 1 and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [
+        ("--help | read none", 141),
+        ("effects --json | read none", 141),
+        ("effects none --json | read none", 2),
+        ("effects none 2>&1 | read none", 2),
+        ("--frob 2>/dev/full", 2),
+        ("--frob 2>&-", 2),
+        ("effects none >&- 2>&-", 2),
+        ("effects >&-", 0),
+        ("effects 2>&-", 0),
+    ],
+)
+def test_output_that_nobody_takes(command: str, code: int):
+    command = command.replace("read none", "(exec 0<&-)")
+    ended = f'"$@" {command}; exit ${{PIPESTATUS[0]}}'
+    done = run("bash", "-c", ended, "bash", *MAIN)
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr and "internal" not in done.stderr
+    # Nothing that belongs to standard error is among the results.
+    assert not done.stdout or code == 0
 
 
 def test_a_defect_of_hdcal_is_one_line_without_debugging():

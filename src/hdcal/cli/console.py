@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -45,9 +45,15 @@ class Console:
         # Findings about options and input, collected before the work.
         self.wrong = Findings()
         self.folder: Target | None = None
+        # Whether the reader of standard output has closed it.
+        self.unread = False
 
     def prepare(self) -> None:
         """Suppress messages of libraries; let any text be printed on any terminal."""
+        # Streams that were closed before the start are None.
+        sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115, as long as the process
+        sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+        sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
@@ -128,13 +134,11 @@ class Console:
         lines = "\n".join(printable(line) for line in text.splitlines())
         self._print(f"hdcal: {lines}", to_error=True)
 
-    def findings(
-        self, findings: Iterable[Finding], show: Callable[[], None] | None = None
-    ) -> None:
-        """Print every finding, or call `show`, and as JSON if --json was given."""
+    def findings(self, findings: Iterable[Finding], text: str | None = None) -> None:
+        """Print every finding, or the text, and as JSON if --json was given."""
         listed = list(findings)
-        if show is not None:
-            show()
+        if text is not None:
+            self._print(text, to_error=True)
         else:
             for finding in listed:
                 self.words(str(finding))
@@ -156,9 +160,17 @@ class Console:
         self.result(drawn(parts, None if terminal else 110, colours=terminal))
 
     def _print(self, text: str, *, to_error: bool) -> None:
-        print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
+        stream = sys.stderr if to_error else sys.stdout
+        try:
+            print(text, file=stream, flush=True)
+        except OSError as error:
+            # A message that cannot be written cannot be reported either.
+            if not (to_error or isinstance(error, BrokenPipeError)):
+                raise
+            self.unread |= not to_error
+            discard(stream)
 
 
-def discard_output() -> None:
-    """Redirect standard output to nowhere: flushing it again would fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def discard(stream: TextIO) -> None:
+    """Redirect a stream to nowhere: flushing it again would fail again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

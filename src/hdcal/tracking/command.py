@@ -5,7 +5,7 @@ import sys
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.console import Console, discard_output
+from hdcal.cli.console import Console, discard
 from hdcal.cli.options import json_option
 
 
@@ -46,7 +46,8 @@ def track(console: Console, known, alarm_rows):
         console.words(f"interrupted after {tracker.rows} rows")
         return 130
     except BrokenPipeError:
-        discard_output()
+        console.unread = True
+        discard(sys.stdout)
     due = tracker.readings / alarm_rows
     console.words(
         f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
