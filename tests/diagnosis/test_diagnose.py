@@ -112,7 +112,7 @@ def test_a_plain_case_has_no_gap_and_nothing_to_close():
     found = diagnose(simulated(rich(), seed=3), quick=True)
     assert found.which.verdict == "none" and not found.which.acting
     assert found.how_far.closed is None and found.gap.probability < 0.5
-    assert not found.seen
+    assert not found.seen and not any(one.explains for one in found.effects)
     obeys(found.to_dict(), Diagnosis)
 
 

@@ -136,7 +136,10 @@ def test_a_calibration_that_failed_is_marked_in_every_file(
     both = cases["one"], cases["two"], "--out", "all", "--json"
     done = here("diagnose", *both)
     assert done.returncode == 1
-    assert [*json.loads(done.stdout)["cases"]] == ["one", "two"]
+    answer = json.loads(done.stdout)
+    assert [*answer["cases"]] == ["one", "two"]
+    assert {why.partition(": ")[0] for why in answer["reasons"]} == {"one", "two"}
+    assert all("checks: chains disagree" in why for why in answer["reasons"])
     assert done.stderr.count("FAILED") >= 2
     one = tmp_path / "all" / "one"
     found = json.loads((one / "verdict.json").read_text("utf-8"))

@@ -4,9 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from posteriors import beside, single
 from rigs import cycles, make_case
 
-from hdcal.diagnosis.refit import rows_to_calibrate, weighed
+from hdcal.diagnosis.diagnose import _stiffness
+from hdcal.diagnosis.refit import Refits, rows_to_calibrate, weighed
 
 
 def fits(chances: dict, failing=(), widths=None):
@@ -87,3 +89,19 @@ def test_long_logs_are_calibrated_on_single_rows_that_hold_the_turns():
     assert len(few.notes) == len(long.notes) + 1
     short = make_case(cycles(102))
     assert rows_to_calibrate(short) is short
+
+
+@pytest.mark.parametrize(
+    ("names", "averaged"),
+    [
+        (("coulomb_friction", "thermal_zero_drift"), True),
+        # Before contact, and after play is taken up.
+        (("contact_onset", "seating_slack"), False),
+        (("contact_onset", "coulomb_friction"), False),
+    ],
+)
+def test_only_stiffnesses_of_one_meaning_are_averaged(names, averaged: bool):
+    plain = single(size=20)
+    models = {name: (0.5, beside(plain, name)) for name in names}
+    found = _stiffness(Refits(models, None, ()))
+    assert (found is not None) == averaged

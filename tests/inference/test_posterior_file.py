@@ -1,5 +1,6 @@
 """A posterior file opens everywhere, and is read only as hdcal wrote it."""
 
+import json
 from pathlib import Path
 
 import h5py
@@ -8,7 +9,7 @@ import pytest
 import xarray as xr
 from posteriors import batch, beside, single, with_leftover
 
-from hdcal.errors import InputError
+from hdcal.errors import InputError, NotUsable
 from hdcal.inference.force_model import problem as problem_module
 from hdcal.inference.model_average import LeftOut, ModelAverage, load_models
 from hdcal.inference.posterior import HYPOTHESIS, Posterior
@@ -99,6 +100,11 @@ def test_a_foreign_file_and_a_missing_one_are_refused(tmp_path: Path):
     xr.Dataset({"K": ("draw", np.ones(3))}).to_netcdf(file, engine="h5netcdf")
     with pytest.raises(InputError, match="not a posterior"):
         Posterior.load(file)
+    file.unlink()
+    answer = {"schema": "hdcal.verdict/3", "status": "failed", "reasons": ["R-hat 2"]}
+    (tmp_path / "verdict.json").write_text(json.dumps(answer))
+    with pytest.raises(NotUsable, match="R-hat 2"):
+        Posterior.load(tmp_path)
 
 
 def test_an_effect_that_the_library_lacks_is_refused(file: Path):

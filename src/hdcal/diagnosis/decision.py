@@ -62,12 +62,13 @@ def decide(
     found = acting(searched, chance, class_of, rng)
     on_noise = [name for name in ON_NOISE if name in searched.effects]
     groups += [(name,) for name in on_noise]
-    causes = [_cause(members, found) for members in groups]
+    explanations = _explanations(found)
+    gap = 1.0 - sum(each.probability for each in explanations if each.nothing)
+    causes = [_cause(members, found, gap) for members in groups]
     causes.sort(key=lambda each: -each.probability)
-    outside, explanations = _cause((OUTSIDE,), found), _explanations(found)
+    outside = _cause((OUTSIDE,), found, gap)
     likeliest = max(chance, key=lambda key: chance[key].sum())
     p_value = adequacy_p_value(searched, likeliest, rng)
-    gap = 1.0 - sum(each.probability for each in explanations if each.nothing)
     # The smallest set with the credible probability.
     total = np.cumsum([each.probability for each in explanations])
     credible = explanations[: int(np.searchsorted(total, _CREDIBLE)) + 1]
@@ -77,7 +78,7 @@ def decide(
         causes=tuple(causes),
         outside=outside,
         explanations=credible,
-        inclusion={name: _cause((name,), found).probability for name in names},
+        inclusion={name: _cause((name,), found, gap).probability for name in names},
         fits=p_value >= _ADEQUATE,
         p_value=p_value,
         not_testable=dict(searched.lacking),
@@ -108,8 +109,8 @@ def _verdict(
     return "group" if acting[0].merged else "named"
 
 
-def _cause(members: tuple[str, ...], found: Sequence[Acting]) -> Cause:
-    """Return a class with its probability, and the share of the gap it explains."""
+def _cause(members: tuple[str, ...], found: Sequence[Acting], gap: float) -> Cause:
+    """Return a class with its probability, and the share it explains of a gap."""
     these = [each for each in found if {*members} & {*each.components, each.noise}]
     samples = [
         (each.closed[members[0]], each.weight)
@@ -119,7 +120,7 @@ def _cause(members: tuple[str, ...], found: Sequence[Acting]) -> Cause:
     return Cause(
         members=tuple(name for name in members if name != OUTSIDE),
         probability=min(sum(each.weight for each in these), 1.0),
-        explains=_interval(samples),
+        explains=_interval(samples) if gap > LIKELY else None,
     )
 
 

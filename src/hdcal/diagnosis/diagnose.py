@@ -83,7 +83,14 @@ def diagnose(
             run.model_copy(update={"run": case.units.say(run.run)})
             for run in rank_runs(searched, posterior)
         ),
-        refits=tuple(Refit(hypothesis=n, probability=p) for n, (p, _) in ranked),
+        refits=tuple(
+            Refit(
+                hypothesis=name,
+                probability=chance,
+                stiffness_N_per_mm=Interval.of(fit.draws["stiffness"]),
+            )
+            for name, (chance, fit) in ranked
+        ),
         left_out=fits.left_out,
         stiffness_N_per_mm=_stiffness(fits),
         reasons=() if fits.posteriors else fits.failures,
@@ -139,8 +146,16 @@ def _gap(case: Case, found: Decision, fit: Fitted) -> Gap:
 
 
 def _stiffness(fits: Refits) -> Interval | None:
-    """Return the stiffness as read over all models [N/mm]."""
-    if not fits.posteriors:
+    """Return the stiffness as read over all models [N/mm].
+
+    None where it means different things: beside an effect that bends the curve it is
+    the slope of one part of it.
+    """
+    bends = {
+        frozenset(e.name for e in fit.effects if e.family.startswith("curve"))
+        for _, fit in fits.posteriors.values()
+    }
+    if len(bends) != 1:
         return None
     from hdcal.prediction.models import joint_draws, models_of
 

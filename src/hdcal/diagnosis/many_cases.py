@@ -97,7 +97,7 @@ def diagnose_many(
     if not found:
         raise InputError(all_findings(refused))
     together = Diagnoses(
-        reasons=tuple(f"{n}: failed" for n, case in found.items() if case["reasons"]),
+        reasons=tuple(f"{n}: {why}" for n, c in found.items() for why in c["reasons"]),
         cases=found,
         refused=refused,
     )

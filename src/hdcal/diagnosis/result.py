@@ -71,6 +71,7 @@ class Refit(Item):
 
     hypothesis: Words
     probability: Probability
+    stiffness_N_per_mm: Interval = quantity("stiffness as read", "N/mm")
 
 
 class Data(Item):
@@ -88,7 +89,8 @@ class Diagnosis(Result):
 
     The clearest patterns, the most informative runs for their effort and the most
     probable models come first; a quick diagnosis has no calibrated models. `left_out`
-    are hypotheses without one.
+    are hypotheses without one. The stiffness is that over all models where it means the
+    same in them.
     """
 
     template = "diagnosis/report.md.j2"

@@ -58,7 +58,8 @@ class Cause(Item):
     """Effects that this loading cannot separate, the likeliest first.
 
     None are something outside the library. The probability is that one of them acts;
-    they then explain a share of the gap's rms, effects on the noise None.
+    they then explain a share of the gap's rms. The share is None of effects on the
+    noise, and where there is more probably no gap.
     """
 
     members: tuple[EffectName, ...]

@@ -111,6 +111,7 @@ def _missing(path: Path) -> InputError | NotUsable:
     with suppress(OSError, ValueError):
         verdict = json.loads((path.parent / "verdict.json").read_bytes())
         if verdict.get("status") == "failed":
-            return NotUsable("this diagnosis failed and must not be used")
+            why = "; ".join(map(str, verdict.get("reasons", ())))
+            return NotUsable(f"this diagnosis failed and must not be used: {why}")
     remedy = "Name the folder of a calibration, or of a diagnosis without --quick"
     return InputError([Finding(str(path), "there is no such file", remedy)])
