@@ -252,3 +252,11 @@ def test_bad_input_is_refused_before_the_fit(here: Hdcal, options, refused):
     for each, name in zip(lines, refused, strict=True):
         assert each.startswith(f"hdcal: {name}: ")
     assert not Path("line-fleet").exists()
+
+
+def test_the_gauge_is_that_of_the_deformation_asked_for():
+    alone, asked = handmade(), handmade(deformation=0.2)
+    assert alone.gauge_rr.deformation_mm == 0.5
+    assert asked.gauge_rr.deformation_mm == 0.2
+    gears = asked.gauge_rr.gears_N.median / alone.gauge_rr.gears_N.median
+    assert gears == pytest.approx(0.4) and alone.gauge_rr.percent_tolerance is None

@@ -67,3 +67,17 @@ def test_a_table_that_cannot_be_read_is_refused(given, words):
 
 def test_without_sizes_in_a_gear_file_a_table_has_no_meaning():
     assert "no gear file" in refused(gear_sizes, TABLE, case(None))[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (TABLE.assign(wall_thickness_mm=50.0), "not thinner than the radius"),
+        (TABLE.assign(load_height_mm=90.0), "beyond the length"),
+        (TABLE.assign(wall_thickness_mm=-1.0), "-1"),
+        (TABLE.iloc[:0], "has no row"),
+    ],
+)
+def test_sizes_that_cannot_be_leave_no_gear(given, words):
+    found = refused(usable, read_fleet(records(), SIZES), given, skip_bad=True)
+    assert any(words in one for one in found)

@@ -89,3 +89,12 @@ def test_each_bound_has_its_confidence():
     low, high = bounds.at_least, bounds.at_most
     assert np.mean(gears.above(low) >= 0.9) == pytest.approx(0.95, abs=1e-3)
     assert np.mean(1.0 - gears.above(high) >= 0.9) == pytest.approx(0.95, abs=1e-3)
+
+
+def test_an_uncertain_population_widens_the_bounds():
+    known = next_force(draws(), 0.4, tested=0.5)
+    spread = np.random.default_rng(1).normal(200.0, 4.0, 4000)
+    wide = next_force({**draws(), "stiffness": spread}, 0.4, tested=0.3)
+    assert wide.bounds[1].at_most > known.bounds[1].at_most + 1.0
+    assert wide.bounds[1].at_least < known.bounds[1].at_least - 1.0
+    assert known.probability_exceeded is None

@@ -154,3 +154,13 @@ def test_fleets_of_any_size(gears: int):
 @pytest.mark.parametrize("kinds", [("lot", "operator"), ("rig",), tuple(GROUPS)])
 def test_fleets_with_groups(kinds: tuple[str, ...]):
     assert_calibrated(ranks_of(16, 200, *kinds))
+
+
+@pytest.mark.parametrize("fault", ["too narrow", "shifted"])
+def test_ranks_that_are_not_calibrated_are_flagged(fault: str):
+    fair = np.random.default_rng(1).uniform(size=200)
+    assert_calibrated({"fair": fair})
+    score = stats.norm.ppf(fair)
+    broken = 1.5 * score if fault == "too narrow" else score + 0.5
+    with pytest.raises(AssertionError, match="broken"):
+        assert_calibrated({"broken": stats.norm.cdf(broken)})

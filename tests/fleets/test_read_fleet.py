@@ -12,6 +12,7 @@ from pyarrow import dataset as tables
 
 from hdcal.data.loading import derive_motion
 from hdcal.data.measurements import parquet
+from hdcal.data.reading import read_case
 from hdcal.fleets.reading import parquet_readings
 from hdcal.fleets.reading.parquet_readings import BatchSums, senses
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
@@ -121,6 +122,7 @@ def test_folders_may_be_partitioned_and_labels_of_any_kind(tmp_path):
     split = tables.partitioning(kinds, flavor="hive")
     tables.write_dataset(table, tmp_path / "a", format="parquet", partitioning=split)
     found = read_fleet(tmp_path / "a")
+    assert sorted(found.case.specimen_labels) == sorted(whole.case.specimen_labels)
     assert np.sort(found.sums.products, axis=0) == pytest.approx(
         np.sort(whole.sums.products, axis=0)
     )
@@ -147,8 +149,11 @@ def test_folders_may_be_partitioned_and_labels_of_any_kind(tmp_path):
         ({"deformation_mm": 45.0}, "'45 mm' on a radius of 40 mm"),
     ],
 )
-def test_a_faulty_cell_names_its_gear_and_file(tmp_path, monkeypatch, change, words):
-    monkeypatch.setattr(parquet, "_BATCH", 30)
+@pytest.mark.parametrize("batch", [30, 1 << 18])
+def test_a_faulty_cell_names_its_gear_and_file(
+    tmp_path, monkeypatch, change, words, batch
+):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
     frame = records()
     for name, value in change.items():
         frame.loc[[30, 33], name] = value
@@ -180,8 +185,9 @@ def test_files_that_are_no_table_of_gears_are_refused(tmp_path):
     assert refused(read_fleet, frame, scheduler="tcp://127.0.0.1:1")
 
 
-def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet, "_BATCH", 90)
+@pytest.mark.parametrize("batch", [90, 1 << 18])
+def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch, batch):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
     frame, rng = records(gears=5, runs=1, rows=60), np.random.default_rng(6)
     frame.loc[70, "force_N"] += 60.0
     frame.loc[150:179, "force_N"] -= 40.0
@@ -230,7 +236,19 @@ def test_a_file_for_each_gear(tmp_path):
     for gear, part in frame.groupby("gear"):
         part.drop(columns="gear").to_csv(folder / f"{gear}.csv", index=False)
     write_gear(folder)
-    same(read_fleet(folder), read_fleet(frame, SIZES))
+    whole = read_fleet(frame, SIZES)
+    same(read_fleet(folder), whole)
+    # Files of other kinds, with other headers and units.
+    part = frame[frame["gear"] == "G0"].drop(columns="gear")
+    (folder / "G0.csv").unlink()
+    part = part.assign(force_N=part["force_N"] / 1000.0)
+    part.rename(columns={"force_N": "Load [kN]"}).to_excel(folder / "G0.xlsx")
+    (folder / "remarks.txt").write_text("measured on a Friday\n")
+    found = read_fleet(folder)
+    assert found.sums.products == pytest.approx(whole.sums.products, rel=1e-6, abs=1e-9)
+    assert any("remarks.txt" in note for note in found.case.notes)
+    alone = read_case(folder, specimen="G1").records.force
+    assert np.array_equal(alone, read_case(folder / "G1.csv").records.force)
     # A file that cannot be read, and one with a faulty cell.
     (folder / "G5.csv").write_text("")
     lines = (folder / "G4.csv").read_text("utf-8").splitlines()
@@ -268,3 +286,17 @@ def test_a_folder_for_each_gear_states_its_sizes(tmp_path):
     assert {*usable(read_fleet(folder), skip_bad=True).case.left_out} == {"G2"}
     frame.to_csv(folder / "G1.csv", index=False)
     assert any("as folders" in words for words in refused(read_fleet, folder))
+
+
+def test_a_gear_with_a_fault_in_one_file_is_left_out_of_all(tmp_path):
+    frame = records(gears=5).astype({"force_N": object})
+    for run, part in frame.groupby("run"):
+        part = part.drop(columns="run").reset_index(drop=True)
+        part.loc[2, "force_N"] = "abc" if run else part.loc[2, "force_N"]
+        part.to_csv(tmp_path / f"F{run}.csv", index=False)
+    found = usable(read_fleet(tmp_path, SIZES), skip_bad=True)
+    assert found.case.specimen_labels == ("G1", "G2", "G3", "G4")
+    assert {*found.case.left_out} == {"G0"}
+    # Of a file that cannot be read nobody knows which gears it held.
+    (tmp_path / "F2.csv").write_text("nothing\n")
+    assert all("F2.csv" in words for words in refused(read_fleet, tmp_path, SIZES))

@@ -29,6 +29,14 @@ def stuck(x, force):
     force[18:] = force[18]
 
 
+def stuck_gauge(x, force):
+    x[18:] = x[18]
+
+
+def at_zero(x, force):
+    x[:] = 0.0
+
+
 def dead(x, force):
     force[:] = 0.1
 
@@ -46,9 +54,11 @@ FAULTS = [
     (broken, "drop of the force for good"),
     (kilonewtons, "stiffness is 1/10"),
     (stuck, "follow no curve"),
+    (stuck_gauge, "follow no curve"),
     (dead, "does not grow"),
     (opposite, "falls as the deformation grows"),
     (one_place, "one deformation only"),
+    (at_zero, "one deformation only"),
 ]
 
 

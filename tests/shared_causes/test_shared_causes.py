@@ -97,6 +97,19 @@ def test_offsets_of_runs_of_any_size_leave_the_evidence_unchanged(one_gear):
         assert found == pytest.approx(expected, abs=0.3)
 
 
+def test_short_mountings_are_no_evidence():
+    """A zero for every three readings leaves little of them, and no more than that."""
+    rng, x = np.random.default_rng(10), np.linspace(0.05, 0.5, 3)
+    parts = []
+    for gear, run in np.ndindex(5, 10):
+        noise = rng.normal(0.0, 0.3, 3) + rng.normal(0.0, 1.0)
+        labels = {"specimen": f"G{gear}", "run": run, "deformation_mm": x}
+        parts.append(pd.DataFrame({**labels, "force_N": 200.0 * x + noise}))
+    found = hdcal.causes(pd.concat(parts), library=LIBRARY)
+    assert all(each[0] == "none" for each in causes_of(found))
+    assert shared(found, "outside").log_evidence_nat < 0.0
+
+
 def test_evidence_is_the_mean_over_the_hypotheses(one_gear):
     library = {name: EFFECTS[name] for name in ("coulomb_friction", "outliers")}
     searched = search(one_gear, library, free_runs=True)
