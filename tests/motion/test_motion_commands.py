@@ -11,7 +11,7 @@ from schema_checks import obeys
 from short import TOO_SHORT, options
 
 from hdcal.motion.dynamic_calibration import DynamicCalibration
-from hdcal.motion.respond import Response
+from hdcal.motion.response import Response
 
 SMALL = ["--points", "101", "--draws", "50"]
 FORCE = "time_s,force_N\n0.0,0\n0.01,40\n0.02,40\n"

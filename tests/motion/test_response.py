@@ -14,7 +14,7 @@ from hdcal import InputError, NotUsable, respond
 from hdcal.data.case import Gear
 from hdcal.inference.force_model.discrepancy import BASIS_SIZE
 from hdcal.motion import gears_in_motion
-from hdcal.motion.respond import Response
+from hdcal.motion.response import Response
 from hdcal.physics.linear_response import LinearGear, linear_response
 
 # One number of points and draws for all: the integration is compiled once.
@@ -157,7 +157,9 @@ def test_a_gear_in_tension_moves_as_the_mirror_image():
     [
         ("push", {}, "not a known force"),
         ("step", {"amplitude": 0.0}, "drives nothing"),
+        ("step", {"amplitude": np.nan}, "nan N does not lie"),
         ("step", {"amplitude": 1e6}, "even at rest"),
+        ("step", {"amplitude": -1e6}, "even at rest"),
         ("step", {"duration": 5e3}, "swings of the gear"),
         ("step", {"damping": -1.0}, "does not lie between 0"),
         ("step", {"temperature": 2500.0}, "Young's modulus by half"),

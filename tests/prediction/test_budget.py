@@ -13,6 +13,7 @@ from posteriors import (
     stiffer,
     written_posterior,
 )
+from scipy import stats
 
 import hdcal
 from hdcal.data.priors import Prior
@@ -160,3 +161,28 @@ def test_a_stated_zero_is_not_asked_for_again():
     short = hdcal.margin(stated, 0.4, quantity="load", limit_force=80.0)
     advice = short.lines("next_step")[0]
     assert "Provide a capacity" in advice and "Read the gauge" not in advice
+
+
+@pytest.mark.parametrize("sigma", [0.01, 1.5, 40.0])
+def test_noise_alone_is_a_normal(sigma: float):
+    found = hdcal.margin(exact(sigma=sigma), 0.1)
+    check(found)
+    noise = by_component(found)["reading noise"]
+    assert noise.standard_uncertainty == pytest.approx(sigma, rel=1e-9)
+    if sigma > 1.0:
+        combined = found.combined_standard_uncertainty_N
+        assert combined == pytest.approx(sigma, rel=0.02)
+        assert found.coverage_factor == pytest.approx(1.96, abs=0.02)
+
+
+# Student's t at 97.5 % for ν degrees of freedom (JCGM 100:2008, Table G.2).
+@pytest.mark.parametrize(("dof", "printed"), [(3.0, 3.18), (5.0, 2.57), (10.0, 2.23)])
+def test_few_readings_have_the_expanded_uncertainty_of_student(dof, printed):
+    """σ known from ν degrees of freedom: the predictive law is a t."""
+    count = 4000
+    known = exact(count)
+    levels = (np.random.default_rng(2).permutation(count) + 0.5) / count
+    sigma = 1.5 * np.sqrt(dof / stats.chi2.ppf(levels, dof))
+    few = written_posterior(known.case, {**known.draws, "sigma": sigma})
+    found = hdcal.margin(few, 0.1)
+    assert found.expanded_uncertainty_N == pytest.approx(1.5 * printed, rel=0.01)

@@ -85,3 +85,18 @@ def test_what_the_draws_do_not_resolve_is_an_upper_limit(normal):
     risk = hdcal.margin(single(size=400), 0.4, limit_force=20.0).worst.exceedance
     assert risk.resolved and risk.probability == pytest.approx(1.0)
     assert risk.lo == risk.at_confidence == 1.0 and np.isfinite(risk.beta)
+
+
+def test_the_stated_error_is_the_scatter_over_posteriors():
+    """Independent draws of σ: the probability scatters as its error says."""
+    found, size, dof = [], 400, 6.0
+    known = exact(size)
+    for seed in range(24):
+        chi = np.random.default_rng(seed).chisquare(dof, size)
+        sigma = {"sigma": 1.5 * np.sqrt(dof / chi)}
+        posterior = written_posterior(known.case, {**known.draws, **sigma})
+        limit = 20.0 + 1.5 * stats.t.isf(0.01, dof)
+        found.append(hdcal.margin(posterior, 0.1, limit_force=limit).worst.exceedance)
+    chances = [risk.probability for risk in found]
+    expected = np.std(chances, ddof=1)
+    assert np.mean([risk.error for risk in found]) == pytest.approx(expected, rel=0.35)

@@ -117,3 +117,13 @@ def test_beyond_the_end_the_bend_replaces_a_fitted_leftover():
     inside, end, just, far = np.abs(two - one)
     assert min(inside, end) > 0.1 and 0.3 * end < just < end
     assert far < 1e-3 * end
+
+
+def test_each_draw_has_a_law_by_its_probability():
+    bend, at = fit_bends(curved()[2])[1], np.array([0.3, 0.6, 0.8])
+    levels = (np.arange(100_000) + 0.5) / 100_000
+    drawn = bend.of_draws(at, levels)
+    for found, law in zip(drawn, bend.law(at), strict=True):
+        np.testing.assert_allclose(found.mean(axis=0), bend.chances @ law, rtol=1e-3)
+    law = int(np.searchsorted(np.cumsum(bend.chances), 0.5))
+    np.testing.assert_allclose(drawn[1][50_000], bend.law(at)[1][law])

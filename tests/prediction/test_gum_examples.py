@@ -62,19 +62,53 @@ def test_the_end_gauge_of_h1():
     assert parts["rest"] ** 0.5 == pytest.approx(np.hypot(11.7, 1.7), abs=0.3)
 
 
+READ = np.array(
+    [
+        [5.007, 4.994, 5.005, 4.990, 4.999],
+        [19.663e-3, 19.639e-3, 19.640e-3, 19.685e-3, 19.678e-3],
+        [1.0456, 1.0438, 1.0468, 1.0428, 1.0433],
+    ]
+)
+# JCGM 100:2008, Tables H.3 and H.4: value, uncertainty and correlation.
+PRINTED = {"R": (127.732, 0.071), "X": (219.847, 0.296), "Z": (254.260, 0.236)}
+TIED = {"RX": -0.588, "RZ": -0.485, "XZ": 0.993}
+
+
+def test_resistance_and_reactance_of_h2():
+    mean, covariance = READ.mean(axis=1), np.cov(READ) / 5
+    drawn = np.random.default_rng(1).multivariate_normal(mean, covariance, TRIALS)
+    voltage, current, phase = drawn.T
+    ratio = voltage / current
+    found = {"R": ratio * np.cos(phase), "X": ratio * np.sin(phase), "Z": ratio}
+    inputs = {"V": voltage, "I": current, "phi": phase}
+    for name, (value, uncertainty) in PRINTED.items():
+        assert found[name].mean() == pytest.approx(value, abs=1e-3)
+        parts = shares_of(found[name], inputs)
+        assert np.sqrt(sum(parts.values())) == pytest.approx(uncertainty, abs=1e-3)
+        # A plane through the three inputs leaves nothing: all of it is theirs.
+        assert parts["rest"] < 1e-3 * sum(parts.values())
+    for pair, printed in TIED.items():
+        tied = np.corrcoef(*(found[name] for name in pair))[0, 1]
+        assert tied == pytest.approx(printed, abs=3e-3)
+
+
 ROOT3 = 3.0**0.5
+# JCGM 101:2008, Tables 2, 3 and 4: sds of the rectangular inputs, half the interval.
+ADDED = {"9.2.3": ((1.0,) * 4, 2.0, 3.88), "9.2.4": ((1.0,) * 3 + (10.0,), 10.1, 17.0)}
 
 
-def test_the_additive_model_of_9_2():
-    """JCGM 101:2008, Table 4: rectangular inputs, of which one is ten times larger."""
-    draw, sds = Inputs(), (1.0, 1.0, 1.0, 10.0)
+@pytest.mark.parametrize("name", ADDED)
+def test_the_additive_model_of_9_2(name: str):
+    sds, printed, half = ADDED[name]
+    draw = Inputs()
     inputs = {f"x{i}": draw.within(-ROOT3 * sd, ROOT3 * sd) for i, sd in enumerate(sds)}
     output = sum(inputs.values())
-    assert output.std() == pytest.approx(10.1, abs=0.06)
-    assert np.abs(np.quantile(output, [0.025, 0.975])) == pytest.approx(17.0, abs=0.06)
+    assert output.std() == pytest.approx(printed, abs=0.06 if printed > 9 else 0.005)
+    ends = np.abs(np.quantile(output, [0.025, 0.975]))
+    assert ends == pytest.approx(half, abs=0.06 if half > 9 else 0.02)
     parts = shares_of(output, inputs)
     for each, sd in zip(inputs, sds, strict=True):
-        assert abs(parts[each] - sd**2) < 5e-3 * sd**2 + 0.06
+        assert abs(parts[each] - sd**2) < 5e-3 * sd**2 + (0.06 if half > 9 else 0.02)
     assert parts["rest"] < 1e-6
 
 
@@ -99,6 +133,30 @@ def test_the_mass_calibration_of_9_3():
     linear = parts["reference"] + parts["added"]
     assert linear**0.5 == pytest.approx(0.0539, abs=2e-4)
     assert parts["rest"] ** 0.5 == pytest.approx(0.0528, abs=5e-4)
+
+
+# JCGM 101:2008, Tables 8 and 9 in 1e-6: correlation, x₁; mean, u, shortest interval.
+MISMATCH = [
+    (0.0, 0.000, 50, 50, (0, 150)),
+    (0.0, 0.050, 2551, 502, (1590, 3543)),
+    (0.9, 0.010, 150, 121, (13, 398)),
+    (0.9, 0.050, 2551, 505, (1628, 3555)),
+]
+
+
+@pytest.mark.parametrize("row", MISMATCH)
+def test_the_comparison_loss_of_9_4(row):
+    tied, x1, mean, sd, ends = row
+    variance = 0.005**2 * np.array([[1.0, tied], [tied, 1.0]])
+    x = np.random.default_rng(3).multivariate_normal([x1, 0.0], variance, TRIALS)
+    output = 1e6 * np.sum(x**2, axis=1)
+    assert output.mean() == pytest.approx(mean, abs=1.5)
+    assert output.std() == pytest.approx(sd, abs=1.2)
+    # The shortest interval is flat at its best: its ends are known to few digits.
+    assert shortest(output, 0.95) == pytest.approx(ends, abs=0.03 * sd + 1.0)
+    parts = shares_of(output, {"x1": x[:, 0], "x2": x[:, 1]})
+    linear = (1e6 * 2.0 * x1 * 0.005) ** 2
+    assert sum(parts.values()) - parts["rest"] == pytest.approx(linear, rel=0.01)
 
 
 def test_an_input_in_order_takes_what_those_before_it_left():

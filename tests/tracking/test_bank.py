@@ -3,14 +3,18 @@
 import copy
 from functools import cache
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from equinox import tree_at
 from posteriors import single
 from scipy import stats
 from streams import correlated, with_correlation
 
-from hdcal.tracking.bank import STIFFNESS
+from hdcal.tracking.bank import CELLS, STIFFNESS, Bank, _normal_score, _rounding_weight
 from hdcal.tracking.tracker import StreamReading, Tracker
+
+STEP = 0.98
 
 
 @cache
@@ -100,3 +104,44 @@ def test_blocks_of_any_size_give_the_same_answers():
         other = apart.follow([reading])[0]
         for name in ("innovation", "correlation", "alarm_score"):
             assert other[name] == pytest.approx(answer[name], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("freedom", [4.0, 1e6])
+def test_scores_of_a_mixture_are_normal_quantiles(freedom):
+    bank = tree_at(
+        lambda bank: bank.log_weight,
+        new_tracker()._bank,
+        jnp.log(jnp.full(128, 1 / 128)),
+    )
+    shift = np.linspace(-0.5, 0.5, 128)
+    for t in (-6.0, -1.0, 0.3, 4.0):
+        probability = stats.t(freedom).cdf(t + shift).mean()
+        expected = stats.norm.ppf(probability)
+        assert float(_normal_score(bank, t + shift, freedom)) == pytest.approx(
+            expected, abs=0.05
+        )
+    assert np.isfinite(float(_normal_score(bank, 1e9 + shift, freedom)))
+
+
+def rounded_bank(noise: float) -> Bank:
+    """Return a bank of readings in steps, beside noise of this sd."""
+    bank = new_tracker()._bank
+    rate = bank.shape * (noise**2 + STEP**2 / 12.0) * jnp.ones(128)
+    bank = tree_at(lambda bank: bank.rate, bank, rate)
+    bank = tree_at(lambda bank: bank.counts, bank, jnp.zeros(CELLS))
+    return tree_at(lambda bank: bank.step, bank, jnp.asarray(STEP))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
+def test_repeated_readings_add_up_to_what_their_mean_says(noise):
+    bank, total = rounded_bank(noise), 0.0
+    for _ in range(7):
+        weight, part, counts = _rounding_weight(bank, 100)
+        bank = tree_at(lambda bank: bank.counts, bank, counts)
+        total += float(weight)
+    share = float(part)
+    # Variance of the mean: what repeats, and a share of the rest.
+    assert total == pytest.approx(1.0 / (share + (1.0 - share) / 7))
+    assert float(_rounding_weight(bank, 200)[0]) == pytest.approx(1.0)
+    other = tree_at(lambda bank: bank.epoch, bank, bank.epoch + 1)
+    assert float(_rounding_weight(other, 100)[0]) == pytest.approx(1.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hdcal.tracking.change_alarm import (
+    ALLOWANCE,
     run_length,
     step_sums,
     threshold_for,
@@ -24,6 +25,32 @@ def test_run_lengths_are_the_published_ones(h, shift, rows):
 @pytest.mark.parametrize("rows", [10.0, 1e4, 1e9])
 def test_a_threshold_gives_back_its_rate(rows):
     assert run_length(threshold_for(rows)) == pytest.approx(2.0 * rows, rel=1e-6)
+
+
+def simulated(h: float, seed: int, streams: int = 3000, longest: int = 4000):
+    """Rows until each of many streams without a change raises an alarm."""
+    rng, up, down = np.random.default_rng(seed), np.zeros(streams), np.zeros(streams)
+    called = np.zeros(streams, dtype=int)
+    for row in range(1, longest + 1):
+        z = rng.normal(size=streams)
+        up = np.maximum(0.0, up + z - ALLOWANCE)
+        down = np.maximum(0.0, down - z - ALLOWANCE)
+        called[(called == 0) & (np.maximum(up, down) > h)] = row
+        if called.all():
+            break
+    return called
+
+
+def test_false_alarms_come_at_the_stated_rate():
+    rows = 200.0
+    called = simulated(threshold_for(rows), 1)
+    assert called.all()
+    error = called.std() / np.sqrt(len(called))
+    assert abs(called.mean() - rows) < 4.0 * error
+    # A threshold that leaves out the second side, or takes a fixed h, is flagged.
+    for wrong in (threshold_for(rows / 2.0), 5.0):
+        called = simulated(wrong, 2)
+        assert abs(called[called > 0].mean() - rows) > 4.0 * error
 
 
 def test_an_alarm_restarts_the_sums():

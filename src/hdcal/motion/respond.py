@@ -4,13 +4,12 @@ Of a gear that was calibrated at rest the data determine the stiffness only; mas
 damping are drawn from their priors, which the result states.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import jax
 import numpy as np
 import pandas as pd
-from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.data.case import require_force
 from hdcal.data.plausible import implausible
@@ -18,18 +17,14 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.force_model.priors import without_scatter
 from hdcal.inference.force_model.problem import case_reading
-from hdcal.inference.posterior import Posterior
-from hdcal.motion.charts import response_chart
 from hdcal.motion.dynamic_problem import mass_prior
 from hdcal.motion.gears_in_motion import integrate_all, moving_draws
+from hdcal.motion.response import Estimate, Estimates, Response
 from hdcal.physics.dynamics import Forcing, damping_ratio, natural_frequency
 from hdcal.prediction import conditions
 from hdcal.prediction.joint import JointModel, joint
 from hdcal.prediction.models import Models, averaging_words
-from hdcal.report.charts.chart_spec import Chart
-from hdcal.report.item import INTERVAL, TAILS, Count, Interval, Item, Words, quantity
-from hdcal.report.provenance import gear_rows
-from hdcal.report.result import Result
+from hdcal.report.item import TAILS, Interval
 
 # A step, or times [s] and forces [N].
 Force = str | tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
@@ -39,80 +34,6 @@ _MOST_SWINGS = 20_000
 # Points whose quantiles are computed together.
 _POINTS = 10_000
 _COLUMNS = tuple(f"deformation_{end}_mm" for end in ("lo", "median", "hi"))
-_BAND = (
-    "equal-tailed pointwise credible band of the deformation of gears like the tested "
-    "one, without reading noise"
-)
-
-
-class Estimate(Interval):
-    """A quantity, and whether data, a prior or the user determine it."""
-
-    driven_by: Literal["data", "prior", "given"]
-
-
-class Estimates(Item):
-    """Quantities of the gear without effects, and its peak deformation."""
-
-    natural_frequency_Hz: Estimate = quantity("natural frequency", "Hz")
-    damped_frequency_Hz: Estimate = quantity("frequency with damping", "Hz")
-    damping_ratio: Estimate = quantity("damping ratio ζ")
-    damping_N_s_per_mm: Estimate = quantity("damping c", "N·s/mm")
-    mass_kg: Estimate = quantity("moved mass m", "kg")
-    stiffness_N_per_mm: Estimate = quantity("stiffness k", "N/mm")
-    peak_mm: Estimate = quantity("largest deformation", "mm")
-
-
-class Response(Result):
-    """The motion under a force, from the unloaded gear, with pointwise bands.
-
-    `looped` is whether the leftover differs between loading and unloading.
-    """
-
-    template = "motion/response.md.j2"
-
-    format: Literal["hdcal.response/1"] = "hdcal.response/1"
-    gear: str
-    calibration: Literal["moving", "at rest"]
-    force: str
-    temperature_C: float
-    estimates: Estimates
-    interval: float = INTERVAL
-    interval_kind: str = _BAND
-    tested_share: float = Field(ge=0.0, le=1.0)
-    effects: tuple[str, ...]
-    left_out: tuple[str, ...]
-    draws: Count
-    points: Count
-    motion: pd.DataFrame = Field(exclude=True)
-    posterior: InstanceOf[Posterior] = Field(exclude=True)
-    looped: bool = Field(exclude=True)
-    averaging: tuple[str, ...] = Field(exclude=True)
-
-    @computed_field
-    @property
-    def remarks(self) -> tuple[Words, ...]:
-        """Limits of the answer, in sentences."""
-        return self.lines("remarks")
-
-    @computed_field(alias="columns")
-    @property
-    def columns_of_motion(self) -> dict[str, list[float | bool]]:
-        """The motion by column; response.csv."""
-        return {str(name): each.tolist() for name, each in self.motion.items()}
-
-    @property
-    def facts(self) -> list[tuple[str, str]]:
-        """The tested gear, as pairs of name and text."""
-        return gear_rows(self.posterior.case, self.posterior.theory)
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return the motion, a row per time."""
-        return self.motion
-
-    def make_charts(self) -> Mapping[str, Chart]:
-        """Return deformation and force over time."""
-        return {"response": response_chart(self.motion)}
 
 
 def respond(
@@ -158,37 +79,16 @@ def respond(
         levels = np.array([at])
         wrong += conditions.temperature_findings(case.gear, gears.draws, levels)
         wrong += implausible("draws", draws, "gears") + implausible("seed", seed)
-        for name, value in given.items():
-            wrong += implausible(name, value)
-            if dynamic and value is not None:
-                words = "this calibration of the moving gear determines it"
-                wrong.append(Finding(name, words, "Leave it out"))
-    if isinstance(force, str):
-        drive = Forcing(np.zeros(1), np.full(1, float(amplitude)))
-        times = np.linspace(0.0, duration or _DURATION, points)
-        words = f"a step of {amplitude:g} N"
-    else:
-        drive = Forcing(*(np.asarray(part, float) for part in force))
-        words = f"a sampled force of {len(drive.time)} rows, linear between them"
-        times = np.linspace(drive.time[0], drive.time[-1], points)
+        wrong += _given_findings(given, dynamic)
+    drive, times, words = _driven(force, amplitude, duration, points)
     values = moving_draws(joint(models, draws), seed)
     m, c, k = _coefficients(gears, values, at, given, seed)
     _check_reach(case.gear.reach, drive, times, m, k)
     deformation, peak = integrate_all(
         gears, values, m, c, force=drive, times=times, temperature=at
     )
-    # Quantiles are computed of a copy: part by part it takes little memory.
-    parts = np.array_split(deformation, -(-points // _POINTS), axis=1)
-    band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
+    motion = _motion(gears, at, drive, times, deformation)
     effects = without_scatter(gears.effects)
-    motion = pd.DataFrame(
-        {
-            "time_s": times,
-            "force_N": jax.vmap(drive)(times),
-            **dict(zip(_COLUMNS, band, strict=True)),
-            "tested": _tested(gears, at, band[0], band[2]),
-        }
-    )
     fitted = None if dynamic else gears.problem.discrepancy
     return Response(
         units=case.units,
@@ -209,6 +109,44 @@ def respond(
         looped=fitted is not None and fitted.looped,
         averaging=tuple(averaging_words(models)),
     )
+
+
+def _driven(
+    force: Force, amplitude: float, duration: float | None, points: int
+) -> tuple[Forcing, np.ndarray, str]:
+    """Return the force over time, the times [s] and the force in words."""
+    if isinstance(force, str):
+        drive = Forcing(np.zeros(1), np.full(1, float(amplitude)))
+        times = np.linspace(0.0, duration or _DURATION, points)
+        return drive, times, f"a step of {amplitude:g} N"
+    drive = Forcing(*(np.asarray(part, float) for part in force))
+    words = f"a sampled force of {len(drive.time)} rows, linear between them"
+    return drive, np.linspace(drive.time[0], drive.time[-1], points), words
+
+
+def _motion(
+    gears: JointModel, at: float, drive: Forcing, times: np.ndarray, deformation
+) -> pd.DataFrame:
+    """Return force and band of the deformation, of draws (draw, time) [mm]."""
+    # Quantiles are computed of a copy: part by part it takes little memory.
+    parts = np.array_split(deformation, -(-len(times) // _POINTS), axis=1)
+    band = np.concatenate([np.quantile(p, TAILS, axis=0) for p in parts], axis=1)
+    return pd.DataFrame(
+        {
+            "time_s": times,
+            "force_N": jax.vmap(drive)(times),
+            **dict(zip(_COLUMNS, band, strict=True)),
+            "tested": _tested(gears, at, band[0], band[2]),
+        }
+    )
+
+
+def _given_findings(given, dynamic: bool) -> Iterator[Finding]:
+    for name, value in given.items():
+        yield from implausible(name, value)
+        if dynamic and value is not None:
+            words = "this calibration of the moving gear determines it"
+            yield Finding(name, words, "Leave it out")
 
 
 def _force_findings(
