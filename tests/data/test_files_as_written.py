@@ -95,6 +95,13 @@ FILES = {
             for k, (x, y) in enumerate(zip(DEFORMATION, FORCE, strict=True))
         ),
     ),
+    "points for thousands beside decimal commas": (
+        "Weg [mm];Kraft [mN]\n"
+        + "".join(
+            f"{x:.6f};{1000 * y:,.6f}\n".translate(str.maketrans(",.", ".,"))
+            for x, y in zip(DEFORMATION, FORCE, strict=True)
+        ),
+    ),
     "a mean and a remark in cells": (
         text("Prüfling,Weg [mm],Kraft [N]\n", [f"A,{row}" for row in BODY])
         + ",,\nMittelwert:,0.25,52\nBemerkung: i.O.,,\n",
@@ -146,6 +153,10 @@ REFUSED = [
     (
         "Weg [um];Kraft [N]\n100;380\n200;567\n300;734\n400;981\n500;1.234\n",
         "'1.234' may be a thousand",
+    ),
+    (
+        "Weg [mm];Kraft [N]\n0,1;0,5\n0,2;2,5\n0,3;4,5\n0,4;10.04,00\n0,5;8,5\n",
+        "row 5, column 'Kraft [N]': '10.04,00' is not a number",
     ),
     (text("Weg [mm];Kraft [N]\nmm;kN\n", SEMI), "names N, and the row of units kN"),
     (
