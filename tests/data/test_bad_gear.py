@@ -54,6 +54,7 @@ ONE = [
     (GEAR + "name = " + "[" * 5000, None, "not TOML"),
     (GEAR + "[rig]\nfilter_Hz = inf\n", "rig.filter_Hz", "finite"),
     (P + "force_gain = { family = 'fixed', value = 1 }\n", "priors.force_gain", ""),
+    (P + 'Eo = { family = "normal" }\n', "priors.Eo", "'E0'"),
     (P + "K = 2.0\n", "priors.K", "not a table"),
     (P + "K = { median = 2 }\n", "priors.K.family", "is missing"),
     (GEAR + "[priors.slack]\nclearance = 3\n", "priors.slack.clearance", "table"),

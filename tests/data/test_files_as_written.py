@@ -56,6 +56,19 @@ FILES = {
         text("# displacement_mm force is in N\n# displacement_mm\tload_N\n", TABS),
     ),
     "no headers": (text(BODY), {}, BY_NUMBER),
+    "UTF-16": (text("deformation_mm\tforce_N\n", TABS).encode("utf-16"),),
+    "one header twice": (
+        text("Weg [mm],Kraft [N],Kraft [N]\n", lines(more=FORCE + 1.0)),
+        *({}, {"columns": {"force": "2"}}),
+    ),
+    "columns separated by blanks": (
+        text("  deformation_mm    force_N\n", lines("      ")),
+    ),
+    "a logger started twice": (
+        text("Weg [mm];Kraft [N]\n", SEMI[:3], "\n\nMessung 2\n")
+        + text("Weg [mm];Kraft [N]\n", SEMI[3:]),
+        TWO_RUNS,
+    ),
     "units behind a slash": (text("Weg / mm;Load / kN\n", lines(";", ",", 1e3)),),
     "a setpoint": (
         text("Displacement setpoint (mm),Displacement (mm),Force (N)\n")
@@ -133,7 +146,7 @@ def test_a_file_is_read_as_it_is_meant(folder, habit):
     # Assumptions come first among the notes.
     assumed = [note.startswith("ASSUMED") for note in case.notes]
     assert assumed == sorted(assumed, reverse=True)
-    assert any(assumed) or habit in ("no headers", "a footer")
+    assert any(assumed) or habit in ("UTF-16", "no headers", "a footer")
 
 
 REFUSED = [

@@ -160,3 +160,24 @@ def test_the_articles_table():
     assert case.notes == ("2 of 14 forces are not multiples of 0.98 N",)
     assert np.array_equal(case.records.direction, np.ones(14))
     assert case.gear.geometry.load_height == 62.0
+
+
+def test_absent_covariates_are_neutral(folder):
+    gear = folder / "gear.toml"
+    gear.write_text(gear.read_text() + "reference_temperature_C = 23.5\n")
+    records = read_case(folder).records
+    assert np.array_equal(records.temperature, np.full(6, 23.5))
+    for name in ("time", "angle", "rate", "force_sd", "run", "specimen"):
+        assert not getattr(records, name).any()
+    assert records.known == frozenset()
+
+
+def test_the_load_cell_of_nist():
+    case = read_case(str(datasets_folder() / "nist-pontius"))
+    assert case.records.run.tolist() == [0] * 20 + [1] * 20
+    slope = np.polyfit(case.records.deformation, case.records.force, 1)[0]
+    g = case.gear.geometry
+    series = (np.pi**2 - 8) / 16
+    shape = g.length * g.wall_thickness**3 / g.radius**3
+    nominal = np.pi * case.gear.priors["E0"].numbers[0] * shape / (24 * series)
+    assert slope == pytest.approx(nominal, rel=2e-3)
