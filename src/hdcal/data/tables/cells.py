@@ -98,7 +98,7 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
     """Return the cells of a column as floats, NaN where wrong, and the faults."""
     if cells.dtype != object:
         return cells, []
-    if comma and _have_grouped(cells):
+    if comma and mark_thousands(cells):
         cells = np.array([cell.replace(".", "") for cell in cells.tolist()], object)
     if (floats := _plain_floats(cells, "," if comma else ".")) is not None:
         return floats, []
@@ -134,7 +134,7 @@ def _plain_floats(cells: np.ndarray, marks: str) -> np.ndarray | None:
     return floats if np.isfinite(floats).all() else None
 
 
-def _have_grouped(cells: np.ndarray) -> bool:
+def mark_thousands(cells: np.ndarray) -> bool:
     """Tell whether all points in texts with decimal commas mark thousands: 1.042,00."""
     texts = cells.tolist()
     if not all(isinstance(cell, str) for cell in texts):
