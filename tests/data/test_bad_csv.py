@@ -58,6 +58,13 @@ ONE = [
     ("deformation_mm,force\n" + GOOD, 1, "force", "no unit"),
     (fourth("nan"), 4, "force_N", "not a number"),
     (H + GOOD.replace(".2,4", "#DIV/0!,4"), 4, "deformation_mm", "'#DIV/0!' is not a"),
+    (fourth("1_0"), 4, "force_N", "not a number"),
+    (fourth("-inf"), 4, "force_N", "not a number"),
+    (b"PK\x03\x04junk", None, None, "workbook"),
+    (
+        timed(*"12345", header=H.replace("\n", ",force_kN\n")),
+        *(1, "force_kN", "may be 'force_N' or 'force_kN'"),
+    ),
     (fourth("1e999"), 4, "force_N", "too large"),
     (fourth("1e200"), 4, "force_N", "does not lie between"),
     (fourth(""), 4, "force_N", "empty"),

@@ -37,3 +37,15 @@ def test_a_part_that_trembles_itself_is_left_as_read(seed: int):
     moved = RAMP + rng.normal(0.0, 0.03, ROWS)
     case = read(moved, 100.0 * moved + rng.normal(0.0, 0.1, ROWS))
     np.testing.assert_array_equal(case.records.deformation, moved)
+
+
+def test_clean_loops_holds_and_steps_are_left_as_read():
+    rng = np.random.default_rng(0)
+    up = np.linspace(0.0, 1.0, 100)
+    for path in (
+        np.concatenate([up, up[::-1]]),
+        np.repeat(np.linspace(0.0, 1.0, 20), 10),
+        np.sin(np.linspace(0.0, 9.0, ROWS)),
+    ):
+        case = read(path, 50.0 * path + rng.normal(0.0, 0.5, len(path)))
+        np.testing.assert_array_equal(case.records.deformation, path)

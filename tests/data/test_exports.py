@@ -159,3 +159,18 @@ def test_formulas_without_values_are_called_so(tmp_path):
     book.save(tmp_path / "book.xlsx")
     with pytest.raises(InputError, match="'force_N' has no cells"):
         read_case(tmp_path / "book.xlsx")
+
+
+def test_a_mass_is_asked_about(tmp_path):
+    (found,) = refused(tmp_path, "Travel (in),Load (lb)\n" + rows(X, F))
+    assert "lbf" in found
+    first, second = refused(tmp_path, "mass (kg),position (m)\n" + rows(F, X))
+    assert "'deformation=2[m]'" in first and "'force=1[kgf]'" in second
+
+
+def test_a_column_that_is_not_used_is_no_obstacle(tmp_path):
+    other = ["1.5"] * 5 + ["OVL", "-", "nan", "1,5", "x", "", "1e999"]
+    text = "deformation_mm;gauge;force_N\n" + rows(X, other, F, separator=";")
+    check(read(tmp_path, text))
+    volts = "Travel (in V),Force (in V),Travel (in mm),Force (in N)\n"
+    check(read(tmp_path, volts + rows(X / 3, F / 50, X, F)))

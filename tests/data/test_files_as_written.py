@@ -56,6 +56,19 @@ FILES = {
         text("# displacement_mm force is in N\n# displacement_mm\tload_N\n", TABS),
     ),
     "no headers": (text(BODY), {}, BY_NUMBER),
+    "UTF-16": (text("deformation_mm\tforce_N\n", TABS).encode("utf-16"),),
+    "one header twice": (
+        text("Weg [mm],Kraft [N],Kraft [N]\n", lines(more=FORCE + 1.0)),
+        *({}, {"columns": {"force": "2"}}),
+    ),
+    "columns separated by blanks": (
+        text("  deformation_mm    force_N\n", lines("      ")),
+    ),
+    "a logger started twice": (
+        text("Weg [mm];Kraft [N]\n", SEMI[:3], "\n\nMessung 2\n")
+        + text("Weg [mm];Kraft [N]\n", SEMI[3:]),
+        TWO_RUNS,
+    ),
     "units behind a slash": (text("Weg / mm;Load / kN\n", lines(";", ",", 1e3)),),
     "a setpoint": (
         text("Displacement setpoint (mm),Displacement (mm),Force (N)\n")
@@ -95,6 +108,13 @@ FILES = {
             for k, (x, y) in enumerate(zip(DEFORMATION, FORCE, strict=True))
         ),
     ),
+    "points for thousands beside decimal commas": (
+        "Weg [mm];Kraft [mN]\n"
+        + "".join(
+            f"{x:.6f};{1000 * y:,.6f}\n".translate(str.maketrans(",.", ".,"))
+            for x, y in zip(DEFORMATION, FORCE, strict=True)
+        ),
+    ),
     "a mean and a remark in cells": (
         text("Prüfling,Weg [mm],Kraft [N]\n", [f"A,{row}" for row in BODY])
         + ",,\nMittelwert:,0.25,52\nBemerkung: i.O.,,\n",
@@ -126,7 +146,7 @@ def test_a_file_is_read_as_it_is_meant(folder, habit):
     # Assumptions come first among the notes.
     assumed = [note.startswith("ASSUMED") for note in case.notes]
     assert assumed == sorted(assumed, reverse=True)
-    assert any(assumed) or habit in ("no headers", "a footer")
+    assert any(assumed) or habit in ("UTF-16", "no headers", "a footer")
 
 
 REFUSED = [
@@ -146,6 +166,10 @@ REFUSED = [
     (
         "Weg [um];Kraft [N]\n100;380\n200;567\n300;734\n400;981\n500;1.234\n",
         "'1.234' may be a thousand",
+    ),
+    (
+        "Weg [mm];Kraft [N]\n0,1;0,5\n0,2;2,5\n0,3;4,5\n0,4;10.04,00\n0,5;8,5\n",
+        "row 5, column 'Kraft [N]': '10.04,00' is not a number",
     ),
     (text("Weg [mm];Kraft [N]\nmm;kN\n", SEMI), "names N, and the row of units kN"),
     (

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import hdcal
+from hdcal.data.measurements.folder import read_gear_folder
 from hdcal.errors import InputError
 
 RNG = np.random.default_rng(3)
@@ -107,3 +108,41 @@ def test_a_unit_against_its_header_has_a_note():
     case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
     assert case.records.force.max() == KN.max()
     assert any("though it names kN" in note for note in case.notes)
+
+
+def test_without_a_gear_file_the_stiffness_is_that_of_the_readings(tmp_path):
+    """At their mean temperature, not at one that nobody measured at."""
+    warm = np.linspace(58.04, 62.04, 9)
+    case = hdcal.read_case(FRAME.assign(temperature_C=warm))
+    assert case.gear.reference_temperature == 60.0
+    words = "at the mean temperature of the readings, 60 °C"
+    assert sum(words in note for note in case.notes) == 1
+    for table, gear, there in (
+        (FRAME, None, 20.0),
+        (FRAME.assign(temperature_C=warm), SIZES, 20.0),
+        (FRAME.assign(temperature_C=warm), {"theory": "spring"}, 20.0),
+    ):
+        case = hdcal.read_case(table, gear)
+        assert case.gear.reference_temperature == there
+        assert not any("mean temperature" in note for note in case.notes)
+    # Of a folder of gears as well; a file that states none counts as the others.
+    for name, each in (("a", 50.0), ("b", 60.0), ("c", None)):
+        warmth = {} if each is None else {"temperature_C": each}
+        FRAME.assign(**warmth).to_csv(tmp_path / f"{name}.csv", index=False)
+    case, _ = read_gear_folder(tmp_path)
+    assert case.gear.reference_temperature == 55.0
+    np.testing.assert_array_equal(case.records.temperature[-9:], 55.0)
+
+
+@pytest.mark.parametrize(
+    ("header", "cells", "words"),
+    [
+        ("Temperatur", [20.0] * 9, "temperature, is not used, as it names no unit"),
+        ("Versuch", [*"abcdefghi"], "run, is not used, as it differs from row to row"),
+    ],
+)
+def test_a_likely_column_that_is_not_used_is_named(header, cells, words):
+    case = hdcal.read_case(FRAME.drop(columns="run").assign(**{header: cells}))
+    start = f"ASSUMED: '{header}', which may be the {words}. Name the column"
+    assert sum(note.startswith(start) for note in case.notes) == 1
+    assert f"columns not used: '{header}'" in case.notes

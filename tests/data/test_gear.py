@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hdcal.data.gear import NO_MATERIAL, read_gear
+from hdcal.data.gear import NO_MATERIAL, at_full_scale, read_gear
 from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.priors import (
@@ -255,3 +255,12 @@ def test_noise_behind_a_filter_is_correlated_as_the_prior_expects():
     assert correlation_of(rig, with_time=False).family == "uniform"
     stated = {"noise_correlation": {"family": "fixed", "value": 0.1}}
     assert correlation_of({**rig, "priors": stated}).numbers == (0.1,)
+
+
+@pytest.mark.parametrize("scale", [FullScale(1e9, 1e-6), FullScale(1e-9, 1e6)])
+def test_the_stiffness_keeps_to_its_range_and_a_stated_one_stays(read, scale):
+    middle = at_full_scale(read(above=SPRING), scale).priors["K"].numbers[0]
+    assert 1e-12 <= middle <= 1e12
+    stated = read("[priors]\n" + STIFF, SPRING)
+    assert stated.priors["K"].numbers == pytest.approx((3000.0, 0.2))
+    assert at_full_scale(stated, scale).priors["K"] == stated.priors["K"]

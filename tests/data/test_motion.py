@@ -141,3 +141,18 @@ def test_what_was_read_on_the_way_back_is_unloading(deformation):
     found = motion(deformation)
     assert found.resets == ()
     assert "unloading" in found.features
+
+
+def test_runs_are_separate():
+    found = motion([0, 5, 1, 4, 2, 3], run=[0, 1, 0, 1, 0, 1])
+    assert found.direction.tolist() == [1, -1, 1, -1, 1, -1]
+    assert found.features == {"unloading"}
+
+
+def test_the_rate_through_noise():
+    rows = 20_000
+    u = np.arange(rows) / rows
+    noisy = 0.5 * u + 1e-4 * np.random.default_rng(0).normal(size=rows)
+    found = motion(noisy, time=100 * u)
+    assert np.median(found.rate) == pytest.approx(0.005, rel=0.02)
+    assert np.quantile(np.abs(found.rate / 0.005 - 1), 0.95) < 0.2

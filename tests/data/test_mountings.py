@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdcal.data.measurements.labels import run_labels
 from hdcal.data.reading import read_case
+from hdcal.data.tables.cells import NOT_STATED
 
 X = np.linspace(0.1, 0.5, 5)
 # Gear, date, rig, operator of each mounting.
@@ -85,3 +87,25 @@ def test_dates_that_cannot_be_read_separate_no_mountings():
     # One that is misspelt is that of the rows above.
     days = [*rows["date"][:9], "2026-1o-12"]
     assert read_case(rows.assign(date=days)).records.run.tolist() == [0] * 5 + [1] * 5
+
+
+@pytest.mark.parametrize(
+    ("stated", "labels"),
+    [
+        # That of the row above: of the same gear, and of no other.
+        ({"rig": "s nn ", "gear": "AAAAA"}, ["s", "s", "n", "n", "n"]),
+        ({"rig": "sn  ", "gear": "AAAB"}, ["s", "n", "n", NOT_STATED]),
+        # Or else that of the row below.
+        ({"rig": " sn", "gear": "AAA"}, ["s", "s", "n"]),
+        ({"rig": "s s", "operator": " KK", "gear": "AAA"}, None),
+        ({"rig": "ss ", "operator": "KMB", "gear": "AAA"}, ["K", "M", "B"]),
+    ],
+)
+def test_an_empty_cell_is_no_mounting(stated, labels):
+    values = {
+        name: np.array([NOT_STATED if c == " " else c for c in cells], object)
+        for name, cells in stated.items()
+        if name != "gear"
+    }
+    found = run_labels(values, pd.factorize(np.array([*stated["gear"]], object))[0])
+    assert (None if found is None else found.tolist()) == labels

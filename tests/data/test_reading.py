@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
-from hdcal.data.tables.cells import CellError, read_number, read_numbers
+from hdcal.data.tables.cells import (
+    CellError,
+    mark_thousands,
+    read_number,
+    read_numbers,
+)
 
 ROWS = [(0.0, 1.5), (0.1, 20.0), (0.2, 41.25), (0.3, 60.5), (0.4, 82.0), (0.5, 101.0)]
 
@@ -59,6 +64,7 @@ def test_every_spelling_of_the_same_table(folder, content):
 @settings(max_examples=200, deadline=None)
 @given(st.text("0123456789+-.eExX_, naif'", min_size=1, max_size=8))
 @example("1_0")
+@example("1.042,5")
 @example("0x10")
 @example("1.5,")
 @example("1e")
@@ -66,6 +72,9 @@ def test_every_spelling_of_the_same_table(folder, content):
 def test_plain_numbers_are_read_as_cells_are_one_by_one(cell):
     for comma in (False, True):
         numbers, faults = read_numbers(np.array([cell], object), comma)
+        if comma and mark_thousands(np.array([cell], object)):
+            assert numbers[0] == float(cell.replace(".", "").replace(",", "."))
+            continue
         with suppress(CellError):
             assert numbers[0] == read_number(cell, comma) and not faults
             continue
@@ -79,6 +88,7 @@ def test_plain_numbers_are_read_as_cells_are_one_by_one(cell):
     ("header", "name", "value"),
     [
         ("temperature_F", "temperature", -10 / 9),
+        ("temperature_K", "temperature", -243.15),
         ("time_min", "time", 1800.0),
         ("angle_deg", "angle", np.pi / 6),
         ("force_sd_kgf", "force_sd", 294.1995),
@@ -160,3 +170,24 @@ def test_the_articles_table():
     assert case.notes == ("2 of 14 forces are not multiples of 0.98 N",)
     assert np.array_equal(case.records.direction, np.ones(14))
     assert case.gear.geometry.load_height == 62.0
+
+
+def test_absent_covariates_are_neutral(folder):
+    gear = folder / "gear.toml"
+    gear.write_text(gear.read_text() + "reference_temperature_C = 23.5\n")
+    records = read_case(folder).records
+    assert np.array_equal(records.temperature, np.full(6, 23.5))
+    for name in ("time", "angle", "rate", "force_sd", "run", "specimen"):
+        assert not getattr(records, name).any()
+    assert records.known == frozenset()
+
+
+def test_the_load_cell_of_nist():
+    case = read_case(str(datasets_folder() / "nist-pontius"))
+    assert case.records.run.tolist() == [0] * 20 + [1] * 20
+    slope = np.polyfit(case.records.deformation, case.records.force, 1)[0]
+    g = case.gear.geometry
+    series = (np.pi**2 - 8) / 16
+    shape = g.length * g.wall_thickness**3 / g.radius**3
+    nominal = np.pi * case.gear.priors["E0"].numbers[0] * shape / (24 * series)
+    assert slope == pytest.approx(nominal, rel=2e-3)

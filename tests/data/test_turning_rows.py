@@ -43,3 +43,11 @@ def test_the_diagnosis_is_the_same_on_either_side():
     assert first == pytest.approx(second, abs=0.03)
     closed = [each.how_far.closed.median for each in found]
     assert closed[0] == pytest.approx(closed[1], abs=0.02)
+
+
+def test_a_reading_that_repeats_the_top_is_on_the_branch_of_its_force():
+    rows = _readings(False)
+    twice = {name: np.insert(v, TOP, v[TOP]) for name, v in rows.items()}
+    twice["force_N"][TOP] += 16.0
+    sense = hdcal.read_case(twice).records.sense
+    assert sense[TOP : TOP + 2].tolist() == [1.0, -1.0]

@@ -257,3 +257,33 @@ def test_ramps_of_one_zero_that_begin_anew_have_no_jump(rows, seed):
     x = np.tile(np.linspace(0.1, 1.0, rows), 4) + rng.normal(0.0, 1e-3, 4 * rows)
     found = screen(x, 100.0 * x + rng.normal(0.0, 0.2, x.size))
     assert not [one for one in found.observations if "jump" in one.kind]
+
+
+def test_a_gauge_zeroed_at_rest_begins_the_record():
+    x, y = ramp()
+    x, y = np.r_[np.full(30, -3.0), x], np.r_[np.zeros(30), y]
+    one = only(screen(x, y))
+    assert (one.kind, one.rows) == ("before the tare", ((0, 29),))
+
+
+def test_an_uneven_movement_is_no_scatter():
+    x = np.cumsum(np.abs(RNG.normal(0.0, 1.0, 400))) * 0.01
+    x = x + RNG.normal(0.0, 0.05, 400)
+    assert screen(x, STIFFNESS * x + RNG.normal(0.0, 0.02, 400)).observations == ()
+
+
+def test_few_rows_show_a_gauge_that_trembles_much():
+    found = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        x = np.linspace(0.0, 1.0, 60)
+        y = STIFFNESS * x + rng.normal(0.0, 0.02, 60)
+        found += screen(x + rng.normal(0.0, 0.1, 60), y).deformation_sd > 0.0
+    assert found >= 18
+
+
+def test_computed_cycles_without_any_error_share_a_part():
+    """Multiples of 1/64 leave not even rounding."""
+    way = 1.0 - np.abs(np.arange(385) / 64.0 % 2.0 - 1.0)
+    part = screen(way, STIFFNESS * np.maximum(way - 0.25, 0.0)).straight
+    assert part.slope == pytest.approx(STIFFNESS, rel=1e-9) and not part.whole

@@ -91,3 +91,12 @@ def test_what_a_part_gave_way_at_is_not_predicted(tmp_path):
     broken.save(tmp_path / "posterior.nc")
     back = hdcal.Posterior.load(tmp_path / "posterior.nc")
     assert back.case.excluded == broken.case.excluded
+
+
+def test_rows_after_a_jump_are_a_run_of_their_own():
+    frame = table()
+    frame.loc[60:, "force_N"] += 11.0
+    case = hdcal.read_case(frame)
+    assert case.run_labels == ("1", "1 (zero 2)")
+    np.testing.assert_array_equal(case.records.run, np.arange(ROWS) >= 60)
+    assert np.ptp(case.records.force) == pytest.approx(20.0, abs=0.2)

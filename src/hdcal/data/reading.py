@@ -2,9 +2,12 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.gear import read_gear
@@ -24,6 +27,12 @@ UNSIZED = (
     f"{ASSUMED}without a gear file the part is a spring: the result is its stiffness, "
     "and no K. K needs the sizes in a gear file, which is named or is the file "
     f"{GEAR_NAME} next to the data"
+)
+
+_WARMTH = (
+    f"{ASSUMED}without a gear file the stiffness is stated at the mean temperature of "
+    "the readings, {:g} °C. For another one write it into a gear file: "
+    "reference_temperature_C"
 )
 
 
@@ -87,6 +96,7 @@ def read_case(
     assert measured is not None and described is not None
     label = None if own != path else specimen
     name = _name(own, folder, sheet, label)
+    described = unsized(*described, measured.get("temperature", ()))
     return case_of(measured, *described, name, range, skip_bad)
 
 
@@ -124,6 +134,19 @@ def gear_of(
         known = read_gear(gear)
         return known, (*_defaults(known), *notes)
     return read_gear({"name": "part", "theory": SPRING}), (UNSIZED,)
+
+
+def unsized(
+    gear: Gear, notes: tuple[str, ...], temperature: Sequence[float] | np.ndarray
+) -> tuple[Gear, tuple[str, ...]]:
+    """Return what `gear_of` returned; without a gear file as warm as its readings.
+
+    The temperature is that of the readings [°C], shape (n,); empty if not measured.
+    """
+    if UNSIZED not in notes or not len(temperature):
+        return gear, notes
+    warm = round(float(np.mean(temperature)), 1)
+    return replace(gear, reference_temperature=warm), (*notes, _WARMTH.format(warm))
 
 
 def _defaults(gear: Gear) -> Iterator[str]:

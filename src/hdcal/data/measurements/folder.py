@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from hdcal.data.case import Case, Gear
@@ -19,7 +20,7 @@ from hdcal.data.measurements.gear_files import (
     not_read,
 )
 from hdcal.data.measurements.measurements import Measurements, read_measurements
-from hdcal.data.reading import asked_columns, gear_of
+from hdcal.data.reading import asked_columns, gear_of, unsized
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
@@ -88,6 +89,8 @@ def read_gear_folder(
         if why.row is None:
             words = f"{why.where}: {why.problem}"
             bad[label] = Finding(str(folder), words, why.remedy)
+    warm = [part["temperature"] for part, _ in parts if "temperature" in part.frame]
+    common, notes = unsized(common, notes, np.concatenate([[], *warm]))
     whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
     about = [f"each {kind} is a gear of that name, unless it has a column of gears"]

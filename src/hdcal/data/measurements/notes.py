@@ -10,6 +10,7 @@ from hdcal.data.measurements.labels import TELLING
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.columns import Column
+from hdcal.data.tables.headers import LABELS, parse_header
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted, shortened
 from hdcal.quantities import Quantities
@@ -37,12 +38,27 @@ def source_notes(
         form = "HEADER" if guesses[0].unit is None else "HEADER[UNIT]"
         option = f"--column '{guesses[0].quantity}={form}'"
         notes.append(f"{ASSUMED}{meanings}. If not, name the column: {option}")
-    notes += [*table.left_out, *others]
     positions = {column.position for column in used.values()}
     extra = [h for place, h in enumerate(table.headers) if place not in positions and h]
+    known = {column.quantity for column in used.values()}
+    notes += [note for header in extra for note in _likely(header, known)]
+    notes += [*table.left_out, *others]
     if extra:
         notes.append(f"columns not used: {', '.join(map(quoted, extra))}")
     return notes
+
+
+def _likely(header: str, known: Container[str]) -> Iterator[str]:
+    """Yield that a column that is not used may hold a quantity that is not known."""
+    meant = parse_header(header)
+    label = meant.quantity in LABELS
+    if meant.quantity and meant.quantity not in known and (label or not meant.unit):
+        why = "differs from row to row" if label else "names no unit"
+        option = f"'{meant.quantity}={header}{'' if label else '[UNIT]'}'"
+        yield (
+            f"{ASSUMED}{quoted(header)}, which may be the {meant.quantity}, is not "
+            f"used, as it {why}. Name the column to use it: --column {option}"
+        )
 
 
 def _meaning(column: Column) -> str:

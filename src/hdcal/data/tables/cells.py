@@ -9,7 +9,13 @@ import numpy as np
 
 from hdcal.data.units import UNITS
 
-NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
+# Also one with points for thousands and a decimal comma: 1.042,00.
+NUMBER = re.compile(
+    r"[+-]?(\d+([.,]\d*)?|[.,]\d+|\d+(\.\d+)+,\d*)([eE][+-]?\d+)?", re.ASCII
+)
+_GROUPED = r"[1-9]\d{0,2}(\.\d{3})+"
+_BOTH = re.compile(rf"[+-]?{_GROUPED},\d*", re.ASCII)
+_EITHER = re.compile(rf"[+-]?(\d+|{_GROUPED})?(,\d*)?", re.ASCII)
 _POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Float() takes more than numbers: nan, inf, 1_000.
 _PLAIN = re.compile(r"[-+.eE\d\n]+", re.ASCII)
@@ -92,6 +98,8 @@ def read_numbers(cells: np.ndarray, comma: bool) -> tuple[np.ndarray, list[Fault
     """Return the cells of a column as floats, NaN where wrong, and the faults."""
     if cells.dtype != object:
         return cells, []
+    if comma and mark_thousands(cells):
+        cells = np.array([cell.replace(".", "") for cell in cells.tolist()], object)
     if (floats := _plain_floats(cells, "," if comma else ".")) is not None:
         return floats, []
     numbers, faults = np.full(len(cells), np.nan), []
@@ -124,6 +132,14 @@ def _plain_floats(cells: np.ndarray, marks: str) -> np.ndarray | None:
     except ValueError:
         return None
     return floats if np.isfinite(floats).all() else None
+
+
+def mark_thousands(cells: np.ndarray) -> bool:
+    """Tell whether all points in texts with decimal commas mark thousands: 1.042,00."""
+    texts = cells.tolist()
+    if not all(isinstance(cell, str) for cell in texts):
+        return False
+    return any(map(_BOTH.fullmatch, texts)) and all(map(_EITHER.fullmatch, texts))
 
 
 def may_hold_thousands(numbers: np.ndarray) -> bool:
