@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior
-from hdcal.data.records import Array, Records
+from hdcal.data.records import FEATURE_WORDS, Array, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, Findings
 from hdcal.inference.force_model.compression import CompressedRows, compress
@@ -199,7 +199,8 @@ def _check(
     with Findings() as findings:
         for effect in effects:
             for need in sorted(effect.needs - case.records.known):
-                words = f"effect '{effect.name}' needs {need}, which these data lack"
+                named = FEATURE_WORDS.get(need, need)
+                words = f"effect '{effect.name}' needs {named}, which these data lack"
                 remedy = "measure it, or leave the effect out"
                 findings.append(Finding(case.name, words, remedy))
         for kind, count in members.items():
