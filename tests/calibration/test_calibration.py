@@ -9,6 +9,7 @@ from rigs import (
     cycles,
     draw_truth,
     make_case,
+    make_gear,
     make_records,
     program,
     ramp,
@@ -23,6 +24,7 @@ from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
+from hdcal.inference import laplace
 from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.marginal import draw_members
 from hdcal.inference.force_model.problem import build_problem
@@ -60,7 +62,7 @@ def test_a_posterior_survives_the_disk_and_rebuilds_its_problem(tmp_path):
     [
         ({"effects": ["coulomb_frction"]}, "Did you mean 'coulomb_friction'"),
         ({"effects": ["coulomb_friction"]}, "needs unloading"),
-        ({"effects": ["rig_compliance"]}, "needs bare_rig"),
+        ({"effects": ["rig_compliance"]}, "needs readings of the rig alone"),
         ({"effects": "outliers"}, "is one text"),
         ({"chains": 1}, "chains"),
         ({"warmup": 0}, "warmup"),
@@ -134,6 +136,18 @@ def test_a_known_sd_by_row_weighs_the_rows():
     assert found.draws["sigma"].mean() < 0.3
     assert found.draws["stiffness"].mean() == pytest.approx(205.0, abs=0.5)
     assert found.draws["stiffness"].std() < 0.3
+
+
+def test_a_diametral_reading_halves_the_radial_deformation():
+    x = np.linspace(0.02, 0.54, 14)
+    records = make_records(x, 205.0 * x + 0.5 * np.cos(9.0 * x))
+    found = []
+    for reading in ("radial", "diametral"):
+        case = make_case(records, make_gear(reading=reading))
+        problem = build_problem(case, effect_priors())
+        mode = laplace.values_at(problem, laplace.fit(problem).centre)
+        found.append((float(mode["K"]), float(mode["stiffness"])))
+    assert found[1] == pytest.approx((2.0 * found[0][0], found[0][1]), rel=0.01)
 
 
 def test_drawn_members_do_not_count_in_the_likelihood():

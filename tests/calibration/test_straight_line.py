@@ -104,6 +104,11 @@ def test_cycles_share_what_is_parallel_of_them():
     assert read(cycles[0], wide).screening.straight is None
 
 
+@pytest.mark.parametrize(("middle", "outcome"), [(75.0, "passed"), (60.0, "failed")])
+def test_a_model_far_from_the_straight_part_fails(middle, outcome):
+    assert straight_check(read(*toe()), np.full(500, middle)).outcome == outcome
+
+
 def test_a_range_with_branches_on_two_lines_fails():
     case = read(*two_branches(), range="10%:50%")
     x, y = np.asarray(case.records.deformation), np.asarray(case.records.force)

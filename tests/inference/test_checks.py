@@ -26,6 +26,7 @@ from hdcal.inference.force_model.identifiability import identification_checks, l
 from hdcal.inference.force_model.problem import build_problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.sample import Draws
+from hdcal.physics.registry import EFFECTS
 
 CHAINS, DRAWS = 4, 500
 RHAT, ESS, BFMI, DIVERGENT = range(4)
@@ -190,6 +191,15 @@ def test_a_flat_direction_of_three_parameters_is_named():
         c.words for c in identification_checks(slopes, priors) if c.outcome == "note"
     ]
     assert len(notes) == 1 and notes[0].startswith("a, b and c ")
+
+
+def test_parts_of_the_noise_have_no_slope_in_the_mean():
+    chosen = (EFFECTS["heteroscedastic_noise"], EFFECTS["outliers"])
+    case = ramp_case()
+    problem = build_problem(case, effect_priors(), chosen)
+    values = {name: prior.numbers[0] for name, prior in problem.priors.items()}
+    slopes = linearise(problem, values, case.records).slopes
+    assert {*slopes} == {"K", "E0", "alpha", "force_offset", "deformation_offset"}
 
 
 @pytest.mark.parametrize(

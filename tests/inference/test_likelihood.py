@@ -54,6 +54,23 @@ def test_rounding_has_a_finite_slope_in_every_tail():
         assert slopes[0][4] > 0.0 > slopes[0][5]
 
 
+@pytest.mark.parametrize("step", [1e-2, 1e-4])
+def test_a_fine_step_is_a_density(step):
+    error = np.linspace(-8.0, 8.0, 33)
+    found = rounded_probability(error, 1.0, step) - np.log(step)
+    # The mean over the interval exceeds the middle by q²/24 times φ''/φ.
+    limit = stats.norm.logpdf(error) + step**2 * (error**2 - 1.0) / 24.0
+    np.testing.assert_allclose(found, limit, rtol=0.0, atol=3.0 * step**4 * 64 + 1e-9)
+
+
+@pytest.mark.parametrize(("mean", "sd"), [(0.0, 3.0), (-7.77, 0.1)])
+def test_probabilities_over_the_grid_sum_to_one(mean, sd):
+    grid, sds = STEP * np.arange(-80, 81), np.full((2, 161), [[sd], [2.0 * sd]])
+    noise = Noise(jnp.log(jnp.array([0.7, 0.3])), jnp.asarray(sds))
+    found = log_probability(grid, np.full(161, mean), noise, STEP, rounded=True)
+    assert STEP * np.sum(np.exp(found)) == pytest.approx(1.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("rounded", [True, False])
 def test_a_mixture_is_the_weighted_sum(rounded):
     rng = np.random.default_rng(2)

@@ -55,12 +55,28 @@ def test_a_posterior_is_read_as_it_was_written(file: Path):
     assert read.to_netcdf() == file.read_bytes()
 
 
+def test_xarray_opens_the_file_with_the_same_numbers(file: Path):
+    with xr.open_datatree(file) as tree:
+        drawn = tree["posterior"]["K"].values.ravel()
+        np.testing.assert_array_equal(drawn, LABELLED.draws["K"])
+        assert [*tree["posterior"]["run_label"].values] == ["0", "1", "2"]
+        assert tree["observed_data"]["force"].attrs["units"] == "N"
+
+
 def number(opened: h5py.File) -> None:
     opened["posterior/K"][0, 3] *= 1.0 + 1e-15
 
 
 def label(opened: h5py.File) -> None:
     opened["posterior/run_label"][1] = "9"
+
+
+def attribute(opened: h5py.File) -> None:
+    opened.attrs["status"] = "failed"
+
+
+def removed(opened: h5py.File) -> None:
+    del opened["prior/alpha"]
 
 
 def without_digest(opened: h5py.File) -> None:
@@ -74,7 +90,7 @@ def older(opened: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        *((e, "changed") for e in (number, label, without_digest)),
+        *((e, "changed") for e in (number, label, attribute, removed, without_digest)),
         (older, "hdcal.posterior/1"),
     ],
 )

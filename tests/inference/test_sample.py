@@ -62,6 +62,11 @@ def test_runs_are_extended_or_repeated(sampler, diverging, mixed, target, multip
     assert found.statistics["diverging"].sum() == (2 if target in diverging else 0)
 
 
+def test_too_short_a_run_is_not_extended(sampler, monkeypatch):
+    monkeypatch.setattr(sample, "_ENOUGH", 10)
+    assert sampler({}, []).shape[1] == DRAWS
+
+
 @pytest.mark.thorough
 def test_an_extended_run_begins_with_the_same_draws(monkeypatch):
     x = np.linspace(0.02, 0.54, 14)

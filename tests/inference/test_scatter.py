@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import numpy as np
 import pytest
+from numpyro.infer import Predictive
 from rigs import make_case, make_gear, make_records
 from short import SHORT
 
@@ -12,6 +14,7 @@ from hdcal import calibrate
 from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
+from hdcal.inference.force_model import model
 from hdcal.inference.force_model.problem import MEMBER_SD, build_problem
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effects.scatter import Scatter
@@ -32,6 +35,17 @@ def case_with(labels: int):
     known = {"run", "specimen"} | ({"runs", "specimens"} if labels > 2 else set())
     records = make_records(deformation, force, run=label, specimen=label, known=known)
     return make_case(records)
+
+
+@pytest.mark.parametrize("known_sd", [0.01, 100.0])
+def test_members_have_their_distribution_however_they_are_sampled(known_sd: float):
+    def members():
+        model._sample_deviations("run_offset", 2.0, known_sd, 5)
+
+    drawn = Predictive(members, num_samples=20_000)(jax.random.key(0))["run_offset"]
+    # Deviations from the mean of five.
+    assert np.std(drawn) == pytest.approx(2.0 * np.sqrt(0.8), rel=0.02)
+    assert np.sum(drawn, axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
 @scatter

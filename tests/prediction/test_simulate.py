@@ -80,7 +80,7 @@ def test_the_centre_of_a_population_is_sd_over_root_n_from_that_of_the_tested():
 @pytest.mark.parametrize("quantity", ["reading", "load", "gear"])
 def test_a_quantity_is_that_of_each_draw_by_itself(quantity: str):
     """Zero, compliance of the rig and zero of the deformation belong to the reading."""
-    case, count = ramp_case(known={"bare_rig"}), 40
+    case, count = ramp_case(known={"readings of the rig alone"}), 40
     own = {
         "deformation_offset": np.full(count, 0.01),
         "rig_compliance.compliance": np.full(count, 1e-3),

@@ -22,7 +22,7 @@ def known(draws: int = 2000, theory="ring", log_sd: float = 0.05) -> Posterior:
 
 def calibrated(size: int, effect: str, **changed) -> Posterior:
     """Return a calibrated gear with an effect, and other values of its sites."""
-    case = ramp_case(known={"bare_rig", "unloading"})
+    case = ramp_case(known={"readings of the rig alone", "unloading"})
     draws = plain_draws(case, size) | {
         name.replace("__", "."): np.broadcast_to(values, size)
         for name, values in changed.items()

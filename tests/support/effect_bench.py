@@ -16,7 +16,7 @@ from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, parameters
 
 # Features that no table of readings on the gear has: such an effect is never tested.
-BEYOND_RECORDS = frozenset({"bare_rig"})
+BEYOND_RECORDS = frozenset({"readings of the rig alone"})
 
 every_effect = pytest.mark.parametrize("name", sorted(EFFECTS))
 compiled_chain = jax.jit(predict_reading)

@@ -76,6 +76,8 @@ class Records(_InDoublePrecision):
     known: frozenset[str] = eqx.field(static=True)
 
 
+# Names of features in messages, where their own do not say what is needed.
+FEATURE_WORDS = {"holds or rates": "holds or several rates"}
 # Readings of a test that begins at the origin have their middle at half their range.
 _FAR = 1.0
 

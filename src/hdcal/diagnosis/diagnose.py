@@ -71,7 +71,6 @@ def diagnose(
     if not quick:
         calibrated = rows_to_calibrate(case)
         fits = refit(calibrated, found.hypotheses, effects, seed, progress)
-    ranked = sorted(fits.posteriors.items(), key=lambda item: -item[1][0])
     return Diagnosis(
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
@@ -83,14 +82,7 @@ def diagnose(
             run.model_copy(update={"run": case.units.say(run.run)})
             for run in rank_runs(searched, posterior)
         ),
-        refits=tuple(
-            Refit(
-                hypothesis=name,
-                probability=chance,
-                stiffness_N_per_mm=Interval.of(fit.draws["stiffness"]),
-            )
-            for name, (chance, fit) in ranked
-        ),
+        refits=_refits(fits),
         left_out=fits.left_out,
         stiffness_N_per_mm=_stiffness(fits),
         reasons=() if fits.posteriors else fits.failures,
@@ -98,13 +90,7 @@ def diagnose(
         library=tuple(effects),
         seed=seed,
         versions=versions(),
-        data=Data(
-            name=case.name,
-            rows=len(case.records.force),
-            rows_diagnosed=len(searched.problem.y),
-            sha256=case.data_sha256,
-            notes=(*calibrated.notes, *fits.failures),
-        ),
+        data=_data(case, searched, (*calibrated.notes, *fits.failures)),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
         posteriors=dict(fits.posteriors),
@@ -142,6 +128,30 @@ def _gap(case: Case, found: Decision, fit: Fitted) -> Gap:
         noise_sd_N=fit.noise_sd,
         share_of_full_scale=size.median / largest if size else None,
         correlation=fit.noise.correlation,
+    )
+
+
+def _data(case: Case, searched: Searched, notes: tuple[str, ...]) -> Data:
+    """Return which data they were."""
+    return Data(
+        name=case.name,
+        rows=len(case.records.force),
+        rows_diagnosed=len(searched.problem.y),
+        sha256=case.data_sha256,
+        notes=notes,
+    )
+
+
+def _refits(fits: Refits) -> tuple[Refit, ...]:
+    """Return the calibrated hypotheses, the most probable first."""
+    ranked = sorted(fits.posteriors.items(), key=lambda item: -item[1][0])
+    return tuple(
+        Refit(
+            hypothesis=name,
+            probability=chance,
+            stiffness_N_per_mm=Interval.of(fit.draws["stiffness"]),
+        )
+        for name, (chance, fit) in ranked
     )
 
 

@@ -39,7 +39,7 @@ _COLUMNS = {
     "angle": "angle",
     "runs": "run",
     "specimens": "specimen",
-    "bare_rig": "bare_rig",
+    "readings of the rig alone": "readings of the rig alone",
 }
 # Relative deviation from proportionality from which an effect is nonlinear.
 _NONLINEAR = 1e-6

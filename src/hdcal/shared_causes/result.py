@@ -26,8 +26,8 @@ class SharedCause(Item):
     """One cause, which may be none or outside the library, over all gears.
 
     It is named for gears in which it alone has a probability of 0.9 or more. `gears`
-    is the number that have it, `share` that among gears to come. The evidence is that
-    of all gears, if each has it, over none.
+    is the number that have it, `share` that among gears to come. The log evidence
+    is the natural log of the Bayes factor, if all gears have it, against no effect.
     """
 
     cause: EffectName

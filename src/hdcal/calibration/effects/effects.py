@@ -3,6 +3,7 @@
 from typing import Literal
 
 from hdcal.data.priors import effect_priors
+from hdcal.data.records import FEATURE_WORDS
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.item import EffectName, Item, Words
@@ -66,7 +67,7 @@ def effects() -> Effects:
             name=name,
             stage=effect.stage,
             family=effect.family,
-            needs=tuple(sorted(effect.needs)),
+            needs=tuple(sorted(FEATURE_WORDS.get(n, n) for n in effect.needs)),
             meaning=(effect.__doc__ or "").strip().split("\n")[0],
             parameters=tuple(rows),
         )

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior
-from hdcal.data.records import Array, Records
+from hdcal.data.records import FEATURE_WORDS, Array, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, Findings
 from hdcal.inference.force_model.compression import CompressedRows, compress
@@ -44,6 +44,8 @@ MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # The cost of a density grows with the cube of the number of runs or specimens.
 _MOST_MEMBERS = 200
 _base_columns = jit(linear_columns)
+# Fields of a problem that hold rows one by one.
+_BY_ROW = ("records", "columns", "before")
 
 
 class Problem(Sampled):
@@ -152,32 +154,23 @@ def build_problem(
     effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     form = structure or decide_structure(case, effects)
-    padded, rows = pad_records(records), len(records.force)
     leftover = build_discrepancy(records, effects) if form.with_gap else None
-    base = np.asarray(_base_columns(padded, reading))[:rows]
-    columns = discrepancy_columns(leftover, padded)
     before = previous_rows(records) if form.correlated else None
-    blocks = None
-    if not (form.rounded or effects):
-        design = base if columns is None else np.hstack([base, columns[:rows]])
-        blocks = compress(design, records, before)
-    if before is not None:
-        extra = (0, len(padded.force) - rows)
-        before = np.pad(before, extra, constant_values=-1)
+    compressed = not (form.rounded or effects)
+    kept = _kept_rows(records, reading, leftover, before, compressed=compressed)
     integrated = []
     if not (form.rounded or any(effect.mixture for effect in effects)):
         # Through an effect the force need not be linear in the stiffness.
-        integrated = [kind for kind in members if kind == "run" or blocks is not None]
+        integrated = [
+            kind for kind in members if kind == "run" or kept["blocks"] is not None
+        ]
         integrated += ["discrepancy"] if form.with_gap else []
     return Problem(
         priors=without_texts(priors),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
-        records=padded if blocks is None else None,
-        blocks=blocks,
-        columns=columns if blocks is None else None,
-        before=before if blocks is None else None,
-        count=rows,
+        **kept,
+        count=len(records.force),
         discrepancy=leftover,
         step=case.gear.force_resolution,
         effects=effects,
@@ -192,6 +185,32 @@ def build_problem(
     )
 
 
+def _kept_rows(
+    records: Records,
+    reading: Reading,
+    leftover: Discrepancy | None,
+    before: np.ndarray | None,
+    *,
+    compressed: bool,
+) -> dict[str, Any]:
+    """Return the fields of a problem that hold rows, compressed if they can be."""
+    padded, rows = pad_records(records), len(records.force)
+    columns = discrepancy_columns(leftover, padded)
+    if compressed:
+        base = np.asarray(_base_columns(padded, reading))[:rows]
+        design = base if columns is None else np.hstack([base, columns[:rows]])
+        blocks = compress(design, records, before)
+        if blocks is not None:
+            return {"blocks": blocks, **dict.fromkeys(_BY_ROW)}
+    if before is not None:
+        extra = (0, len(padded.force) - rows)
+        before = np.pad(before, extra, constant_values=-1)
+    return {
+        "blocks": None,
+        **dict(zip(_BY_ROW, (padded, columns, before), strict=True)),
+    }
+
+
 def _check(
     case: Case, effects: Sequence[type[Effect]], members: Mapping[str, int]
 ) -> None:
@@ -199,7 +218,8 @@ def _check(
     with Findings() as findings:
         for effect in effects:
             for need in sorted(effect.needs - case.records.known):
-                words = f"effect '{effect.name}' needs {need}, which these data lack"
+                named = FEATURE_WORDS.get(need, need)
+                words = f"effect '{effect.name}' needs {named}, which these data lack"
                 remedy = "measure it, or leave the effect out"
                 findings.append(Finding(case.name, words, remedy))
         for kind, count in members.items():

@@ -7,7 +7,11 @@ from hdcal.physics.theory import Scalar
 
 
 class RigCompliance(
-    Effect, stage="deformation", family="rig", needs=("bare_rig",), instantaneous=True
+    Effect,
+    stage="deformation",
+    family="rig",
+    needs=("readings of the rig alone",),
+    instantaneous=True,
 ):
     """ω → ω/(1 + c k): springs in series, 1/k_read = 1/k + c.
 
