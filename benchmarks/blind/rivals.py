@@ -14,6 +14,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
+from hdcal.screening.turning_points import MEDIAN_SIZE
 
 Library = Mapping[str, type[Effect]]
 # Slope and offset are free; the loss of modulus is held by its prior.
@@ -110,7 +111,7 @@ def _straight(case: Case, noise_sd: float | None) -> _Straight:
     if noise_sd is None:
         bends = np.diff(force - slope * x * (1.0 - alpha.mean() * rise), 2)
         # The spread of second differences, which a smooth gap hardly touches.
-        noise_sd = float(np.median(np.abs(bends)) / (0.6745 * np.sqrt(6.0)))
+        noise_sd = float(np.median(np.abs(bends)) / (MEDIAN_SIZE * np.sqrt(6.0)))
     warm = slope * x * rise * alpha.std()
     held = max(noise_sd, 1e-6 * float(np.max(np.abs(force))))
     table = np.stack([x, np.ones_like(x), warm], axis=1)

@@ -53,6 +53,13 @@ def test_several_sizes_change_along_the_gradient():
     assert sizes["radius_mm"] == pytest.approx(40.0 * np.exp(-left / 3.0), rel=1e-6)
 
 
+def test_the_table_of_designs_ends_before_the_sentence_on_it():
+    found = inverse_design(known(200), WALL, 60.0, probability=0.9)
+    page = found.page("hdcal design RUN")
+    table = page[page.index("keeps the limit") : page.index("Force and stress are")]
+    assert table.count("</tr>") == 3 and table.endswith("</div><p>")
+
+
 def test_the_coldest_temperature_decides():
     mild, cold = (
         inverse_design(known(), WALL, 60.0, temperatures=levels).design.sizes_mm

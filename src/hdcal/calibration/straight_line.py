@@ -12,14 +12,13 @@ from hdcal.screening.result import (
     NORMAL_95,
     StraightPart,
 )
+from hdcal.screening.turning_points import MEDIAN_SIZE
 
 if TYPE_CHECKING:
     from hdcal.inference.checks import Check
 
 # So many rows decide a line; of more every second, third, … is taken.
 _MOST_ROWS = 20_000
-# Residuals of normal noise have their median size at so many sds.
-_MEDIAN_SIZE = 0.6745
 
 
 class RobustLine(NamedTuple):
@@ -51,7 +50,7 @@ def robust_line(records: Records) -> RobustLine | None:
         columns += [rise / np.ptp(rise), columns[0] * rise / np.ptp(rise)]
     design = np.column_stack([*columns, np.ones(len(force))])
     start = np.linalg.lstsq(design, force, rcond=None)[0]
-    size = float(np.median(np.abs(force - design @ start))) / _MEDIAN_SIZE
+    size = float(np.median(np.abs(force - design @ start))) / MEDIAN_SIZE
     size = max(size, 1e-9 * float(np.ptp(force)), 1e-300)
     # The problem is linear: SciPy's own differences find its slopes exactly.
     found = least_squares(

@@ -12,6 +12,7 @@ from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
 from hdcal.evidence.row_features import half_cycle_rows
 from hdcal.inference.distributions import frozen
+from hdcal.screening.turning_points import MEDIAN_SIZE
 
 GROWING, OUTLIERS = "heteroscedastic_noise", "outliers"
 # Prior odds of each effect on the noise, whatever acts on the mean.
@@ -27,8 +28,6 @@ _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 _STEPS, _RATIOS = 15, 3
 # Probability by which wild readings lie on one side by chance.
 _CHANCE = 0.01
-# Sd of normal noise over its median absolute value.
-_MEDIAN_TO_SD = 1.4826
 
 
 class NoiseModel(NamedTuple):
@@ -138,7 +137,7 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
     a, b = map(float, problem.priors[f"{OUTLIERS}.fraction"].numbers)
     count, share = len(problem.y), a / (a + b)
     error = problem.y - fitted(np.ones(count))
-    sd = _MEDIAN_TO_SD * float(np.median(np.abs(error))) + 1e-300
+    sd = float(np.median(np.abs(error))) / MEDIAN_SIZE + 1e-300
     wild, weight = np.zeros(count), np.ones(count)
     for _ in range(_STEPS):
         log_odds = np.log(share / (1.0 - share)) - np.log(ratio)

@@ -5,6 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
+from hdcal.screening.turning_points import MEDIAN_SIZE
+
 # Rows on each side of the one that is looked at: a robust line through ten rows
 # bears two or three wild ones.
 REACH = 5
@@ -41,10 +43,10 @@ class Usual:
         if size.size < 2:
             return cls(np.inf, _FEW_DOF)
         middle, far = (quantile(size, share) for share in (0.5, 0.95))
-        scale = max(float(middle) / 0.6745, least)
+        scale = max(float(middle) / MEDIAN_SIZE, least)
         if size.size < _FEW:
             return cls(scale, _FEW_DOF)
-        tail = float(far) / max(float(middle), 0.6745 * least)
+        tail = float(far) / max(float(middle), MEDIAN_SIZE * least)
         return cls(scale, float(np.interp(-tail, -_TAILS, _DOFS)))
 
     def surprised(self, values: np.ndarray, places: int) -> np.ndarray:

@@ -7,6 +7,8 @@ import numpy as np
 TURN_SHARE, TURN_MOST = 5e-3, 0.2
 HOLD_SHARE, HOLD_MOST = 2.5e-3, 0.05
 
+# Median absolute value of normal noise, in sds: Φ⁻¹(¾).
+MEDIAN_SIZE = 0.6744897501960817
 # Fewer rows were taken by hand: uneven steps would pass for noise.
 FEWEST_FOR_NOISE = 50
 
@@ -16,7 +18,7 @@ def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
     if x.size < fewest:
         return 0.0
     # the sd of x[i-1] - 2 x[i] + x[i+1] is √6 times that of x
-    return float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * 6**0.5)
+    return float(np.median(np.abs(np.diff(x, 2)))) / (MEDIAN_SIZE * 6**0.5)
 
 
 def rows_of_runs(run: np.ndarray) -> list[np.ndarray]:

@@ -33,6 +33,7 @@ from hdcal.inference.force_model.values import predict_rows
 from hdcal.inference.posterior import Posterior
 from hdcal.quantities import Quantities
 from hdcal.screening.local_fit import least_step
+from hdcal.screening.turning_points import MEDIAN_SIZE
 
 NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 # Draws that the fitted reading is averaged over: its error is then a tenth of that of
@@ -40,8 +41,8 @@ NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 _DRAWS = 200
 # Fewer rows do not show the properties of their noise.
 _LEAST_ROWS = 12
-# A normal sd over the median of absolute errors, and the efficiency of that median.
-_NORMAL, _EFFICIENCY = 1.4826, 0.37
+# Efficiency of the median of absolute errors.
+_EFFICIENCY = 0.37
 # A wild reading lies so many sds off and has so large a share of all squares, and few
 # readings are wild: jumps of a rig are many, and noise may have long tails.
 _WILD, _SHARE, _FEW = 12.0, 0.02, 3
@@ -243,7 +244,7 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     """
     size, far = len(sd), np.abs(left.scaled)
     rounding = least_step(np.asarray(records.force)) / np.sqrt(12.0)
-    scale = np.maximum(_NORMAL * float(np.median(far)), rounding / sd)
+    scale = np.maximum(float(np.median(far)) / MEDIAN_SIZE, rounding / sd)
     times = far / np.maximum(scale, 1e-300)
     chance = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
     row = int(np.argmax(far))
