@@ -73,6 +73,8 @@ def test_the_forces_of_a_gear_that_is_pulled_are_negative():
     ("vary", "changed", "words"),
     [
         ({"wall_tickness_mm": [0.6]}, {}, "Did you mean 'wall_thickness_mm'"),
+        ({"wall_thickness_mm": [0.6, -1.0]}, {}, "-1 mm does not lie"),
+        ({"radius_mm": []}, {}, "0 designs"),
         ({"wall_thickness_mm": [50.0]}, {}, "not thinner than the radius"),
         ({"radius_mm": [30.0]}, {"deformation": -31.0}, "reaches the radius of 30"),
         ({"load_height_mm": [50.0]}, {}, "changes nothing under the theory 'ring'"),

@@ -143,6 +143,8 @@ def test_a_generator_that_pulls_is_the_mirror_of_one_that_presses():
     ("changed", "words"),
     [
         ({"window": (0.42, 0.38)}, "0.42:0.38 is empty"),
+        ({"window": (np.nan, 0.4)}, "nan mm does not lie"),
+        ({"temperatures": [-300.0]}, "absolute zero"),
         ({"window": (-0.1, 0.4)}, "-0.1:0.4 contains zero"),
         ({"window": (0.399, 0.401), "setting_sd": 0.01}, "no spring rate between"),
         ({"probability": 0.9999}, "cannot be estimated from 1000 independent draws"),
