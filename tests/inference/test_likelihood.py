@@ -89,6 +89,25 @@ def test_a_mixture_is_the_weighted_sum(rounded):
     np.testing.assert_allclose(found, slow, rtol=1e-8)
 
 
+def test_an_interval_has_both_ends_in_a_far_tail():
+    low = np.array([-40.0, -25.0, 24.0, 30.0])
+    high = low + np.array([0.01, 1.0, 0.02, 3.0])
+    # By symmetry the upper tail is the lower one.
+    left, right = np.where(low > 0.0, -high, low), np.where(low > 0.0, -low, high)
+    upper, lower = log_ndtr(right), log_ndtr(left)
+    slow = upper + np.log1p(-np.exp(lower - upper))
+    np.testing.assert_allclose(likelihood.log_interval(low, high), slow, rtol=1e-8)
+
+
+def test_the_precision_of_a_row_is_averaged_over_its_mixture():
+    weights, error = np.array([0.8, 0.2]), np.array([0.1, 1.0, 6.0])
+    sd = np.array([[0.5, 0.5, 1.0], [2.0, 5.0, 4.0]])
+    joint = weights[:, None] * stats.norm.pdf(error, 0.0, sd)
+    slow = np.sum(joint / sd**2, axis=0) / joint.sum(axis=0)
+    noise = Noise(jnp.log(weights), jnp.asarray(sd))
+    np.testing.assert_allclose(likelihood.row_precision(error, noise), slow, rtol=1e-9)
+
+
 @pytest.mark.parametrize("ratio", [0.05, 1.0])
 def test_sheppards_correction_where_the_step_is_fine(ratio):
     """What is left after matching the variance is the uniform's fourth cumulant.

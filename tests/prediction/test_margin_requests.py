@@ -5,9 +5,11 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from posteriors import single, spring
+from posteriors import plain_draws, ramp_case, single, spring, written_posterior
+from rigs import make_gear
 
 import hdcal
+from hdcal.data.prior import Prior
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 
@@ -93,6 +95,22 @@ def test_a_deformation_far_from_the_readings_is_a_slip_of_the_unit():
         with pytest.raises(InputError, match="Give it in mm") as refused:
             ask(spring(), 400.0)
         assert fields(refused) == ["deformation"]
+
+
+def test_a_load_needs_the_place_of_first_contact():
+    def posterior(shift: float, **priors):
+        case = ramp_case(make_gear(**priors))
+        moved = replace(case.records, deformation=case.records.deformation + shift)
+        case = replace(case, records=moved)
+        return written_posterior(case, plain_draws(case, 400))
+
+    stated = Prior("normal", (5.0, 0.01), "mm", "the rig's zero")
+    assert hdcal.margin(posterior(0.0), 0.4, quantity="load")
+    assert hdcal.margin(posterior(5.0), 5.4)
+    assert hdcal.margin(posterior(5.0, deformation_offset=stated), 5.4, quantity="load")
+    with pytest.raises(InputError) as refused:
+        hdcal.margin(posterior(5.0), 5.4, quantity="load")
+    assert fields(refused) == ["quantity"]
 
 
 def test_models_have_probabilities_and_are_of_the_same_data(one):

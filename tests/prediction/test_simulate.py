@@ -126,6 +126,17 @@ def test_the_rig_drifts_outside_the_tested_temperatures_by_its_priors():
     assert not load["zero_drift"].any() and not load["frame_drift"].any()
 
 
+def test_the_rig_drifts_by_the_kelvins_outside_the_tested_temperatures():
+    case = ramp_case(temperature=np.linspace(20.0, 60.0, 30), known={"temperature"})
+    warm = np.array([0.0, 20.0, 40.0, 60.0, 70.0])
+    posterior = written_posterior(case, plain_draws(case, 400))
+    drift = simulated(posterior, warm=warm, at=np.full(5, AT)).common["zero_drift"]
+    per_kelvin = drift[:, 4] / 10.0
+    expected = np.outer(per_kelvin, [-20.0, 0.0, 0.0, 0.0, 10.0])
+    assert per_kelvin.std() > 0.05
+    np.testing.assert_allclose(drift, expected, rtol=1e-9)
+
+
 SIZES = {"wall_thickness": 0.02, "radius": 0.05}
 
 
