@@ -67,6 +67,10 @@ def diagnose(
     posterior = searched.table.posterior(TEMPERATURE)
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
+    excluded = [
+        f"{effect_words(name)} is excluded: the gear file fixes its amplitude at zero"
+        for name in searched.excluded
+    ]
     calibrated, fits = case, Refits({}, None, ())
     if not quick:
         calibrated = rows_to_calibrate(case)
@@ -90,7 +94,7 @@ def diagnose(
         library=tuple(effects),
         seed=seed,
         versions=versions(),
-        data=_data(case, searched, (*calibrated.notes, *fits.failures)),
+        data=_data(case, searched, (*calibrated.notes, *excluded, *fits.failures)),
         case=case,
         rows=gap_by_row(searched, posterior, rng),
         posteriors=dict(fits.posteriors),

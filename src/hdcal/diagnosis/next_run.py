@@ -221,8 +221,8 @@ def _on_run(searched: Searched, part: Part, after: Records):
     if grid is None:
         # The deviation of a new member is unknown.
         return np.zeros(_ROWS), np.zeros((count, _ROWS))
-    # Several amplitudes are linear, in units of their prior sd.
-    ends = part.chord if count == 1 else grid.sd * np.eye(count)
+    # Several amplitudes are linear, in units of the rms of their priors.
+    ends = part.chord if count == 1 else np.diag(grid.rms)
     values = grid.at(np.array(ends), part.shape)
     curves = effect_curves(grid.effect, values, problem.base, after, problem.reading)
     curves = curves[:, rows : rows + _ROWS]

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import erf
 
+from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.evidence.items import STEPS, Amplitudes, Atoms, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
@@ -21,9 +22,14 @@ from hdcal.evidence.parameter_grid import (
     SCALE_WEIGHTS,
     SCALES,
     ParameterGrid,
+    amplitudes_of,
+    is_zero_centred,
     make_grid,
+    prior_rms,
 )
+from hdcal.inference.distributions import quantiles
 from hdcal.inference.force_model.padding import repeat_last_row
+from hdcal.inference.force_model.problem import MEMBER_SD
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.scatter import Scatter, scores
@@ -86,12 +92,11 @@ def components(
             grids.append(None)
             spaces.append(_members(owner, effect, problem))
             continue
-        grid = make_grid(effect, problem.priors)
-        if len(grid.amplitudes) > 1:
+        if len(amplitudes_of(effect)) > 1:
             grid = make_grid(effect, problem.priors, "subspace")
             spaces += _several_amplitudes(owner, grid, problem)
         else:
-            grid, found = _one_amplitude(owner, grid, problem)
+            grid, found = _one_amplitude(owner, effect, problem)
             before = sum(len(each.slope) for each in atoms)
             atoms.append(found._replace(curve=before + found.curve))
         grids.append(grid)
@@ -105,15 +110,17 @@ def _of_rows(effect: type[Effect], values: dict, problem: LinearProblem):
 
 
 def _one_amplitude(
-    owner: int, grid: ParameterGrid, problem: LinearProblem
+    owner: int, effect: type[Effect], problem: LinearProblem
 ) -> tuple[ParameterGrid, Atoms]:
     """Return the atoms of an effect with one amplitude, and the grid that they use."""
-    ends = np.array([grid.unit, grid.unit / 2.0])
-    table = _of_rows(grid.effect, grid.at(ends), problem).reshape(grid.size, 2, -1)
-    deviation = np.max(np.abs(table[:, 0] - 2.0 * table[:, 1]))
-    if grid.normal and deviation <= _NONLINEAR * np.max(np.abs(table)):
-        return grid, _linear_atoms(owner, grid, table[:, 0] / grid.unit)
-    cells = make_grid(grid.effect, problem.priors, "cells")
+    grid = make_grid(effect, problem.priors, "linear")
+    if grid.normal:
+        ends = np.array([grid.unit, grid.unit / 2.0])
+        table = _of_rows(effect, grid.at(ends), problem).reshape(grid.size, 2, -1)
+        deviation = np.max(np.abs(table[:, 0] - 2.0 * table[:, 1]))
+        if deviation <= _NONLINEAR * np.max(np.abs(table)):
+            return grid, _linear_atoms(owner, grid, table[:, 0] / grid.unit)
+    cells = make_grid(effect, problem.priors, "cells")
     return cells, _cell_atoms(owner, cells, problem)
 
 
@@ -170,7 +177,7 @@ def _several_amplitudes(
 ) -> list[Space]:
     """Return a space for each shape point of an effect with several amplitudes."""
     count = len(grid.amplitudes)
-    table = _of_rows(grid.effect, grid.at(grid.sd * np.eye(count)), problem)
+    table = _of_rows(grid.effect, grid.at(np.diag(grid.rms)), problem)
     table = table.reshape(grid.size, count, -1)
     shown = np.flatnonzero(_shown(grid, problem))
     weights = np.log(SCALE_WEIGHTS) - np.log(len(shown))
@@ -197,11 +204,18 @@ def _members(owner: int, effect: type[Scatter], problem: LinearProblem) -> Space
     score = np.asarray(scores(padded))[: len(label)]
     added = _of_rows(effect, {"sd": np.ones(1)}, problem)[0] / score
     columns = added * (label == np.unique(label)[:, None])
-    sd = make_grid(effect, problem.priors).sd
+    sds, log_mass = _member_sds(problem.priors[MEMBER_SD[effect.members]])
+    return Space(owner, principal(columns), sds, log_mass)
+
+
+def _member_sds(prior: Prior) -> tuple[Float[np.ndarray, " t"], ...]:
+    """Return sds between members that stand for their prior, with log probabilities."""
+    if not is_zero_centred(prior):
+        sds = np.abs(quantiles(prior, len(STEPS)))
+        return sds, np.full(len(sds), -np.log(len(sds)))
     edges = np.concatenate([[0.0], np.sqrt(STEPS[1:] * STEPS[:-1]), [np.inf]])
     below = erf(edges[:, None] / (np.sqrt(2.0) * SCALES)) @ SCALE_WEIGHTS
-    log_mass = np.log(np.maximum(np.diff(below), 1e-300))
-    return Space(owner, principal(columns), sd * STEPS, log_mass)
+    return prior_rms(prior) * STEPS, np.log(np.maximum(np.diff(below), 1e-300))
 
 
 @jax.jit

@@ -151,9 +151,7 @@ def linear_problem(
     order = np.argsort(np.asarray(case.records.run), kind="stable")
     records, reading = take_rows(case.records, order), case_reading(case)
     shipped, effects = effect_priors(case.gear.full_scale), [*library.values()]
-    own = problem_priors(case, effects, shipped, case.gear.theory)
-    # Those of scatter are sites of no problem.
-    priors = shipped | case.gear.effect_priors | own
+    priors = problem_priors(case, effects, shipped, case.gear.theory)
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
     least = max(least, case.gear.force_resolution / np.sqrt(12.0))
     noise_sd = float(max(noise_sd or _noise_sd(records, least), least))

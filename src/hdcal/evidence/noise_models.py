@@ -8,10 +8,16 @@ from jaxtyping import Float, Int
 from scipy.special import betaln, entr, expit
 from scipy.stats import binomtest
 
+from hdcal.data.prior import Prior
 from hdcal.evidence.linear_problem import LinearProblem
-from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
+from hdcal.evidence.parameter_grid import (
+    SCALE_WEIGHTS,
+    SCALES,
+    is_zero_centred,
+    prior_rms,
+)
 from hdcal.evidence.row_features import half_cycle_rows
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import quantiles
 from hdcal.screening.turning_points import MEDIAN_SIZE
 
 GROWING, OUTLIERS = "heteroscedastic_noise", "outliers"
@@ -81,14 +87,8 @@ def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel
     zero, records = float(problem.base.deformation_offset), problem.records
     load = np.abs(np.asarray(records.deformation) - zero)
     load = load * float(problem.base.stiffness)
-    relative = np.sqrt(1.0 + (_GROWTH[:, None] * load / load.max()) ** 2)
-    typical = np.sqrt(np.mean(relative**2, axis=1))
-    share = _GROWTH * problem.noise_sd / typical / load.max()
-    sd = float(problem.priors[f"{GROWING}.share"].numbers[-1])
-    # Prior mass of each share under a mixture of half-normals, cells a factor 2 wide.
-    z = share[:, None] / (sd * SCALES)
-    density = np.sqrt(2.0 / np.pi) * (z * np.exp(-0.5 * z**2)) @ SCALE_WEIGHTS
-    mass = np.maximum(np.log(2.0) * density, 1e-300)
+    growth, mass = _growth(problem, load)
+    relative = np.sqrt(1.0 + (growth[:, None] * load / load.max()) ** 2)
     log_prior = np.log(PRIOR_ODDS) + np.log(mass)
     # The geometric mean stays one, so that the reference noise sd keeps its meaning.
     mean = np.exp(np.mean(np.log(relative), axis=1, keepdims=True))
@@ -96,6 +96,31 @@ def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel
         NoiseModel(GROWING, weight, correlation, float(log))
         for weight, log in zip(problem.weight * mean / relative, log_prior, strict=True)
     ]
+
+
+def _growth(
+    problem: LinearProblem, load: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " g"], Float[np.ndarray, " g"]]:
+    """Return growths of the noise sd, as `_GROWTH`, with their prior probabilities.
+
+    With g the growth, s the share, L the largest load, m the mean square of the load
+    over L, and σ the noise sd over all rows, s L = g σ / √(1 + g² m).
+    """
+    prior, largest = problem.priors[f"{GROWING}.share"], float(load.max())
+    mean_square = np.mean((load / largest) ** 2)
+    if is_zero_centred(prior):
+        typical = np.sqrt(1.0 + _GROWTH**2 * mean_square)
+        share = _GROWTH * problem.noise_sd / typical / largest
+        # A mixture of half-normals, in cells a factor 2 wide.
+        z = share[:, None] / (prior_rms(prior) * SCALES)
+        density = np.sqrt(2.0 / np.pi) * (z * np.exp(-0.5 * z**2)) @ SCALE_WEIGHTS
+        return _GROWTH, np.maximum(np.log(2.0) * density, 1e-300)
+    share = quantiles(prior, len(_GROWTH))
+    variance = (share * largest / problem.noise_sd) ** 2
+    # Larger shares than noise in proportion to the load has are cut.
+    rest = np.maximum(1.0 - variance * mean_square, 1e-12)
+    growth = np.minimum(np.sqrt(variance / rest), _GROWTH[-1])
+    return growth, np.full(len(growth), 1.0 / len(growth))
 
 
 class _Fit(NamedTuple):
@@ -119,8 +144,7 @@ def outliers(
     bound, tight where rows are clearly wild or not; these come from an EM fit. `fitted`
     maps weights of rows to the mean reading given some hypothesis.
     """
-    quantiles = (np.arange(_RATIOS) + 0.5) / _RATIOS
-    ratios = frozen(problem.priors[f"{OUTLIERS}.ratio"]).ppf(quantiles)
+    ratios = quantiles(problem.priors[f"{OUTLIERS}.ratio"], _RATIOS)
     best = max(
         (_fit_outliers(problem, ratio, fitted) for ratio in ratios),
         key=lambda fit: fit.bound,
@@ -128,13 +152,13 @@ def outliers(
     if _agree(best.wild, problem.before):
         return []
     grid = sorted({0.0, correlation})
-    log_prior = np.log(PRIOR_ODDS) + best.log_factor - np.log(_RATIOS * len(grid))
+    log_prior = np.log(PRIOR_ODDS) + best.log_factor - np.log(len(ratios) * len(grid))
     weight = problem.weight * best.weight
     return [NoiseModel(OUTLIERS, weight, c, float(log_prior)) for c in grid]
 
 
 def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
-    a, b = map(float, problem.priors[f"{OUTLIERS}.fraction"].numbers)
+    a, b = _beta_numbers(problem.priors[f"{OUTLIERS}.fraction"])
     count, share = len(problem.y), a / (a + b)
     error = problem.y - fitted(np.ones(count))
     sd = float(np.median(np.abs(error))) / MEDIAN_SIZE + 1e-300
@@ -152,6 +176,17 @@ def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
     log_factor = float(bound - np.sum(np.log(weight)))
     found = np.where(wild > 0.5, error, 0.0)
     return _Fit(float(bound - count * np.log(sd)), weight, log_factor, found)
+
+
+def _beta_numbers(prior: Prior) -> tuple[float, float]:
+    """Return a and b of the beta distribution with mean and variance of a prior."""
+    if prior.family == "beta":
+        a, b = map(float, prior.numbers)
+        return a, b
+    share = np.clip(quantiles(prior, 1000), 1e-6, 1.0 - 1e-6)
+    mean, product = float(share.mean()), float(share.mean() * (1.0 - share.mean()))
+    total = max(product / max(float(share.var()), 1e-6 * product) - 1.0, 0.1)
+    return mean * total, (1.0 - mean) * total
 
 
 def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:

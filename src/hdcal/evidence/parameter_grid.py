@@ -10,7 +10,7 @@ from jaxtyping import Float
 from scipy.special import erf
 
 from hdcal.data.prior import Prior
-from hdcal.inference.distributions import frozen, moments
+from hdcal.inference.distributions import frozen, moments, quantiles
 from hdcal.physics.effect import Effect, parameters
 
 Kind = Literal["linear", "cells", "subspace"]
@@ -26,15 +26,39 @@ SCALES = np.array([0.1, 1.0 / 3.0, 1.0, 3.0, 10.0])
 SCALE_WEIGHTS = np.array([0.15, 0.2, 0.3, 0.2, 0.15])
 # Least probability of a cell, whose logarithm is needed.
 _LEAST = 1e-300
+# Half the width of the cell of a fixed amplitude, relative.
+_FIXED = 1e-3
+
+
+def is_zero_centred(prior: Prior) -> bool:
+    """Whether a prior is half-normal, or normal about zero."""
+    about_zero = prior.family == "normal" and prior.numbers[0] == 0.0
+    return about_zero or prior.family == "half_normal"
+
+
+def prior_rms(prior: Prior) -> float:
+    """Return the root mean square of a prior: the sd of one that is zero-centred."""
+    return float(np.hypot(*moments(prior)))
+
+
+def amplitudes_of(effect: type[Effect]) -> tuple[str, ...]:
+    """Return the names of the parameters without which an effect vanishes."""
+    return tuple(n for n, p in parameters(effect).items() if p.null is not None)
+
+
+def is_excluded(effect: type[Effect], priors: Mapping[str, Prior]) -> bool:
+    """Whether priors fix all amplitudes of an effect at zero, where it vanishes."""
+    stated = [priors.get(f"{effect.name}.{name}") for name in amplitudes_of(effect)]
+    return all(prior and prior_rms(prior) == 0.0 for prior in stated)
 
 
 @dataclass(frozen=True)
 class ParameterGrid:
     """Shape points and amplitude prior of one effect.
 
-    There are several amplitudes only where the effect is linear in them; they share the
-    prior of the first. The mean is that of a normal prior, else 0; the sd of a half-
-    normal prior is its scale.
+    Prior, mean and sd are those of the first amplitude: the mean that of a normal
+    prior, else 0; the sd of a half-normal prior is its scale. An effect with several
+    amplitudes is linear in them; `rms` is the root mean square of the prior of each.
     """
 
     effect: type[Effect]
@@ -43,6 +67,7 @@ class ParameterGrid:
     prior: Prior
     mean: float
     sd: float
+    rms: Float[np.ndarray, " a"]
 
     @property
     def size(self) -> int:
@@ -62,7 +87,7 @@ class ParameterGrid:
     @property
     def widths(self) -> tuple[np.ndarray, np.ndarray]:
         """Factors on the prior sd of the amplitude, and their probabilities."""
-        if self.normal and self.mean == 0.0:
+        if is_zero_centred(self.prior):
             return SCALES, SCALE_WEIGHTS
         return np.ones(1), np.ones(1)
 
@@ -89,6 +114,9 @@ class ParameterGrid:
 
     def cells(self) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " c"]]:
         """Return the edges of amplitude cells, and the prior probability of each."""
+        if self.prior.family == "fixed":
+            value = float(self.prior.numbers[0])
+            return np.sort([value * (1.0 - _FIXED), value * (1.0 + _FIXED)]), np.ones(1)
         if not self.normal:
             prior = frozen(self.prior)
             ends = np.concatenate([[1e-6], np.linspace(0.02, 0.98, 25), [1.0 - 1e-6]])
@@ -109,10 +137,8 @@ def make_grid(
 ) -> ParameterGrid:
     """Return the points of one effect; priors are by site, `effect.parameter`."""
     own = {name: priors[f"{effect.name}.{name}"] for name in parameters(effect)}
-    amplitudes = tuple(n for n, p in parameters(effect).items() if p.null is not None)
+    amplitudes = amplitudes_of(effect)
     prior = own[amplitudes[0]]
-    if prior.family == "fixed":
-        raise ValueError("the amplitude of an effect cannot be fixed")
     normal = prior.family in ("normal", "half_normal")
     return ParameterGrid(
         effect=effect,
@@ -121,6 +147,7 @@ def make_grid(
         prior=prior,
         mean=float(prior.numbers[0]) if prior.family == "normal" else 0.0,
         sd=float(prior.numbers[-1]) if normal else moments(prior)[1],
+        rms=np.array([prior_rms(own[name]) for name in amplitudes]),
     )
 
 
@@ -129,10 +156,6 @@ def _shapes(free: Mapping[str, Prior], kind: Kind) -> dict[str, np.ndarray]:
     varied = sum(prior.family != "fixed" for prior in free.values())
     counts = _SHAPE_POINTS[kind]
     count = counts[min(max(varied, 1), len(counts)) - 1]
-    quantiles = (np.arange(count) + 0.5) / count
-    axes = [
-        prior.numbers[:1] if prior.family == "fixed" else frozen(prior).ppf(quantiles)
-        for prior in free.values()
-    ]
+    axes = [quantiles(prior, count) for prior in free.values()]
     table = np.array(list(product(*axes)), float)
     return dict(zip(free, table.T, strict=True))

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from hdcal.evidence.components import Components
 from hdcal.evidence.items import MOST_COLUMNS, STEPS, Space, principal
 from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.parameter_grid import prior_rms
 from hdcal.evidence.row_features import (
     cosines,
     half_cycle_rows,
@@ -166,7 +167,7 @@ def remainder_space(
     problem: LinearProblem, owner: int, columns, choices: int = 1
 ) -> Space:
     """Return a space of unknown size of columns of rms one, among many choices."""
-    sd = float(problem.priors["gap_sd"].numbers[-1])
+    sd = prior_rms(problem.priors["gap_sd"])
     log_weight = np.full(len(STEPS), -np.log(len(STEPS)) - np.log(choices))
     return Space(owner, columns, sd * STEPS, log_weight)
 

@@ -17,6 +17,7 @@ from hdcal.evidence.evaluation import Evaluated, select
 from hdcal.evidence.items import Space
 from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import GROWING, OUTLIERS, NoiseModel
+from hdcal.evidence.parameter_grid import is_excluded
 from hdcal.evidence.parts import Part, join, log_sign_probability, merged, posterior
 from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
@@ -75,7 +76,7 @@ def search(
     found.coarse_step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
     if not found.coarse_step:
-        found.other_noises(library)
+        found.other_noises()
     found.pairs()
     return found
 
@@ -111,8 +112,9 @@ def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
 class Searched:
     """All hypotheses of a case; everything alone is entered at once.
 
-    `effects` of the library predict something for the rows; the others lack columns
-    that were not measured. `coarse_step` is that of readings on a coarse grid [N], else
+    `effects` of the library predict something for the rows; of the others some are
+    `lacking` columns that were not measured, and some are `excluded` by their priors.
+    `coarse_step` is that of readings on a coarse grid [N], else
     0.
     """
 
@@ -125,7 +127,13 @@ class Searched:
         known_kernels: list[Space] | None = None,
     ):
         self.problem, self.lacking = problem, lacking(library, problem.records)
-        self.effects = {n: e for n, e in library.items() if n not in self.lacking}
+        self.excluded = tuple(
+            name
+            for name, effect in library.items()
+            if is_excluded(effect, problem.priors)
+        )
+        unused = {*self.lacking, *self.excluded}
+        self.effects = {n: e for n, e in library.items() if n not in unused}
         self.components = effects = components(self.effects, problem)
         self.outside = len(effects.names)
         self.families = local_families(problem)
@@ -192,17 +200,17 @@ class Searched:
                 table.add_noises([more])
                 self._alone([len(table.noises) - 1])
 
-    def other_noises(self, library: Mapping[str, type[Effect]]) -> None:
+    def other_noises(self) -> None:
         """Enter everything alone under the library's models of the noise."""
         table, problem = self.table, self.problem
         likeliest = int(np.argmax(table.noise_probabilities()))
         correlation = table.noises[likeliest].correlation
         more = (
             noise_models.growing_noise(problem, correlation)
-            if GROWING in library
+            if GROWING in self.effects
             else []
         )
-        if OUTLIERS in library:
+        if OUTLIERS in self.effects:
             for key in dict.fromkeys([(), table.ranked()[0]]):
                 parts = table.parts[key]
 
