@@ -32,7 +32,7 @@ _FIXED = 1e-3
 
 def is_zero_centred(prior: Prior) -> bool:
     """Whether a prior is half-normal, or normal about zero."""
-    about_zero = prior.family == "normal" and prior.numbers[0] == 0.0
+    about_zero = prior.family == "normal" and float(prior.numbers[0]) == 0.0
     return about_zero or prior.family == "half_normal"
 
 
