@@ -51,10 +51,10 @@ def one_place(x, force):
 
 FAULTS = [
     (jump, "jump of the force"),
-    (broken, "drop of the force for good"),
+    (broken, "permanent drop of the force"),
     (kilonewtons, "stiffness is 1/10"),
-    (stuck, "follow no curve"),
-    (stuck_gauge, "follow no curve"),
+    (stuck, "do not follow a smooth curve"),
+    (stuck_gauge, "do not follow a smooth curve"),
     (dead, "does not grow"),
     (opposite, "falls as the deformation grows"),
     (one_place, "one deformation only"),
@@ -150,7 +150,7 @@ def test_fewer_than_three_that_are_left_are_refused():
     assert len(usable(read_fleet(frame), skip_bad=True).sums.gear) == 3
     frame.loc[frame["gear"] == "G2", "force_N"] *= -1.0
     words = refused(usable, read_fleet(frame), skip_bad=True)
-    assert "of 4 gears 2 can be used" in words[-1] and len(words) == 3
+    assert "2 of 4 gears can be used" in words[-1] and len(words) == 3
 
 
 @pytest.mark.parametrize(

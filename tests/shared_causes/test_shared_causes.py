@@ -13,10 +13,11 @@ import hdcal
 from hdcal.errors import Finding
 from hdcal.evidence.noise_models import PRIOR_ODDS
 from hdcal.evidence.search import search
+from hdcal.fleets.reading.read_fleet import usable
 from hdcal.physics.registry import EFFECTS
 from hdcal.shared_causes import gear_evidence
 from hdcal.shared_causes.gear_evidence import Weight, by_cause, weigh_gear
-from hdcal.shared_causes.gears import read_gears, usable_gears
+from hdcal.shared_causes.gears import _stuck, read_gears, usable_gears
 from hdcal.shared_causes.result import FleetCauses
 
 LIBRARY = {
@@ -41,6 +42,20 @@ def fleet(loop_N: float, seed: int = 0) -> pd.DataFrame:
             force = np.round(stiffness * x + loop + noise, 4)
             rows = {"specimen": gear, "run": run, "deformation_mm": x, "force_N": force}
             parts.append(pd.DataFrame(rows))
+    return pd.concat(parts, ignore_index=True)
+
+
+def drifting(gears: int) -> pd.DataFrame:
+    """Return eight gears, some read with an amplifier that drifts by 0.02 N/s."""
+    rng = np.random.default_rng(4)
+    x = np.tile(np.r_[np.linspace(0.02, 0.48, 12), np.linspace(0.46, 0.04, 11)], 2)
+    time, parts = 50.0 * np.arange(len(x)), []
+    for gear in range(8):
+        stiffness = 200.0 * (1.0 + 0.01 * rng.standard_normal())
+        force = stiffness * x + rng.normal(0.0, 0.3, len(x))
+        force += 0.02 * time * (gear < gears)
+        rows = {"specimen": f"G{gear}", "time_s": time, "deformation_mm": x}
+        parts.append(pd.DataFrame(rows | {"force_N": np.round(force, 4)}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -168,6 +183,52 @@ def spoiled(table: pd.DataFrame, how: str) -> pd.DataFrame:
         force = force.astype(object)
         force[table.index[bad][3]] = "broken"
     return table.assign(force_N=force)
+
+
+@pytest.mark.parametrize("gears", [1, 3])
+def test_a_strong_effect_of_a_few_gears_is_evidence_and_no_fault(gears):
+    readings = read_gears(drifting(gears))
+    with pytest.raises(hdcal.InputError, match="do not follow a smooth curve"):
+        usable(readings)
+    _, found, left_out = usable_gears(readings)
+    assert len(found) == 8 and not left_out
+    library = {name: EFFECTS[name] for name in ("amplifier_drift", "coulomb_friction")}
+    weight = weigh_gear(found["G0"], library, 0)
+    assert not isinstance(weight, Finding)
+    likeliest = max(weight, key=lambda cause: weight[cause].log_evidence)
+    assert likeliest == "amplifier_drift"
+
+
+@pytest.mark.parametrize("channel", ["force", "deformation"])
+@pytest.mark.parametrize("rows", [slice(6, 11), slice(14, 23), slice(29, 37)])
+def test_a_stuck_channel_is_named(channel, rows):
+    table = fleet(0.8)
+    name = {"force": "force_N", "deformation": "deformation_mm"}[channel]
+    stuck = table.index[table.specimen == "G5"][rows]
+    table.loc[stuck, name] = table.loc[stuck[0], name]
+    with pytest.raises(hdcal.InputError, match=f"'G5'.*the {channel} is stuck"):
+        usable_gears(read_gears(table))
+
+
+def test_holds_and_coarse_displays_are_not_stuck():
+    up = np.linspace(0.02, 0.5, 25)
+    x, force = np.r_[up, np.full(20, 0.5)], 200.0 * np.r_[up, np.full(20, 0.5)]
+    relaxed = force.copy()
+    relaxed[25:] -= 30.0 * (1.0 - np.exp(-np.arange(20) / 12.0))
+    crept = x.copy()
+    crept[25:] += 0.1 * (1.0 - np.exp(-np.arange(20) / 12.0))
+    one = np.zeros(45, int)
+    assert _stuck(x, relaxed, one, display=False) == 0
+    assert _stuck(force, crept, one, display=True) == 0
+    fine, all_one = np.linspace(0.0, 0.5, 60), np.zeros(60, int)
+    flat = np.minimum(200.0 * fine, 70.0)
+    assert _stuck(np.round(flat, 0), fine, all_one, display=True) == 0
+    assert _stuck(np.round(200.0 * fine, -1), fine, all_one, display=False) == 0
+    # The next run may begin where the last one ended.
+    runs = np.repeat(np.arange(9), 5)
+    level = np.repeat([1.0, 2.0, 2.001], 15)
+    assert _stuck(level, np.arange(45.0), one, display=True) == 15
+    assert _stuck(np.arange(45.0), np.arange(45.0), runs, display=False) == 0
 
 
 def failing(gear, library, seed: int):

@@ -1,1 +1,1 @@
-"""How stiff is each of many gears, and which of them are not like the others?"""
+"""Stiffness of many gears, and detection of outliers."""

@@ -1,4 +1,4 @@
-"""Whether values taken on dates change: not, by steps, steadily, or from day to day.
+"""Test for change over time: no change, steps, linear drift, or day-to-day scatter.
 
 The evidence of each of the four has a closed form given the scatter of values of one
 level, which is integrated over a grid. Before the data, levels scatter in proportion to
@@ -80,7 +80,7 @@ def changes(
 
     `day` is the index of each value's date, `time` of each date ascends, (d,).
     """
-    # One wild value moves neither the median nor the grid.
+    # One outlier moves neither the median nor the grid.
     value = value - np.median(value)
     sums = _sums(day, value, variance)
     ends = np.arange(len(time) + 1)

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hdcal.fleets.reading.readings import modulus_left
+from hdcal.fleets.gear_table import ranked
+from hdcal.fleets.reading.readings import relative_modulus
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import (
     BLUE,
@@ -19,6 +20,7 @@ from hdcal.report.charts.chart_spec import (
     Rule,
     Span,
 )
+from hdcal.screening.result import NORMAL_95
 
 if TYPE_CHECKING:
     from hdcal.fleets.over_time import Change
@@ -72,18 +74,16 @@ def curves_chart(fleet: "Fleet") -> Chart:
         for name in ("specimen", "deformation", "force", "temperature")
     )
     line = fleet.population.stiffness_N_per_mm.median * x
-    line *= modulus_left(case.gear, warm) * (1.0 if ratio is None else ratio[gear])
+    line *= relative_modulus(case.gear, warm) * (1.0 if ratio is None else ratio[gear])
     table = fleet.gear_table.loc[np.unique(gear)]
-    order = ["flagged", "probability_off"]
-    flagged = table.sort_values(order, ascending=False, kind="stable")
-    flagged = flagged.head(min(int(table["flagged"].sum()), _MOST_FLAGGED))
+    flagged = ranked(table[table["flagged"]]).head(_MOST_FLAGGED)
     ordinary = table[~table["flagged"]].sort_values("stiffness_N_per_mm")
     some = np.linspace(0, len(ordinary) - 1, min(len(ordinary), _MOST_ORDINARY))
     shown = [(f"ordinary {fleet.part}s", ordinary.index[some.round().astype(int)])]
     shown += [(row.gear, [row.Index]) for row in flagged.itertuples()]
     marks: list[Mark] = [Rule(at=0.0)]
-    for (name, who), colour in zip(shown, (GREY, *CYCLE[1:]), strict=False):
-        rows = np.isin(gear, who)
+    for (name, gears), colour in zip(shown, (GREY, *CYCLE[1:]), strict=False):
+        rows = np.isin(gear, gears)
         if rows.any():
             distance = y[rows] - line[rows]
             marks.append(Points(label=name, colour=colour, x=x[rows], y=distance))
@@ -111,7 +111,7 @@ def _change_panel(change: "Change", begin: np.datetime64) -> Panel:
         drift = np.array([-half, half])
         marks.append(Line(label="drift", x=ends, y=drift, colour=GREY))
     for left_out, values in change.values.groupby("left_out"):
-        y, half = values["value"].to_numpy(), 1.96 * values["sd"].to_numpy()
+        y, half = values["value"].to_numpy(), NORMAL_95 * values["sd"].to_numpy()
         label, colour = ("left out", ORANGE) if left_out else ("", BLUE)
         each = {"x": days(values["day"]), "y": y, "low": y - half, "high": y + half}
         marks.append(Points(label=label, colour=colour, **each))

@@ -1,4 +1,4 @@
-"""Many gears of one kind: the population, the odd gears, the next gear."""
+"""Many gears of one kind: the population, outliers, the next gear."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ def fleet(
     skip_bad: bool = False,
     progress: Progress | None = None,
 ) -> Fleet:
-    """Compare many gears of one kind: scatter, odd gears, gears to come.
+    """Compare many gears of one kind: scatter, outliers, future gears.
 
     Args:
         data: a case, file or table as `read_case` takes it, with a column specimen; a
@@ -54,7 +54,7 @@ def fleet(
         warmup: iterations of adaptation per chain, where NUTS draws.
         draws: kept per chain.
         seed: of all random numbers.
-        deformation: as read, at which the force of gears to come is predicted [mm].
+        deformation: as read, at which the force of future gears is predicted [mm].
         limit_force: a capacity to compare that force with, its size [N].
         force_tolerance: width within which the force at the largest deformation, or at
             `deformation`, may lie [N].

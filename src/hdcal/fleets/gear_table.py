@@ -76,12 +76,17 @@ def _influence(readings: FleetReadings, fit: FittedFleet) -> dict[str, np.ndarra
     return {"K": middle, "K_lo": low, "K_hi": high}
 
 
+def ranked(table: pd.DataFrame, first: str = "flagged") -> pd.DataFrame:
+    """Return gears with a mark first, then the most probable outliers first."""
+    order = [first, "probability_off"]
+    return table.sort_values(order, ascending=False, kind="stable")
+
+
 def flagged_gears(table: pd.DataFrame) -> tuple[Flagged, ...]:
     """Return the flagged gears: in stiffness first, then the most probable first."""
-    first = table["flagged_in"].str.contains("stiffness")
-    order = ["first", "probability_off"]
-    found = table.assign(first=first).sort_values(order, ascending=False, kind="stable")
-    found = found.loc[found["flagged"]].astype(object).replace({np.nan: None})
+    found = table.loc[table["flagged"]]
+    found = found.assign(first=found["flagged_in"].str.contains("stiffness"))
+    found = ranked(found, "first").astype(object).replace({np.nan: None})
     names = ["gear", "zero_N", "noise_sd_N", "loop_N", "bend_N"]
     return tuple(
         Flagged(

@@ -1,7 +1,7 @@
-"""Gears to come: their stiffness, and the force that one of their readings needs.
+"""Future gears: their stiffness, and the force that one of their readings needs.
 
-Given the population, both are mixtures of normals about one mean: a gear to come may be
-odd in its stiffness, and odd in its zero, with the probabilities of the population. It
+Given the population, both are mixtures of normals about one mean: a future gear may be
+an outlier in its stiffness and in its zero, with the population's probabilities. It
 belongs to a lot, an operator and a rig that were not measured.
 """
 
@@ -18,14 +18,14 @@ from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.prediction.conditions import far_findings
 from hdcal.report.item import Interval, Item, Probability, quantity
 
-# Shares of gears to come, and the confidence, of the bounds.
+# Shares of future gears, and the confidence, of the bounds.
 _CONTENTS, _CONFIDENCE = (0.9, 0.99), 0.95
 
 
 class Bounds(Item):
-    """One-sided bounds of a share of the gears to come, each with the confidence."""
+    """One-sided bounds of a share of the future gears, each with the confidence."""
 
-    content: Probability = quantity("share of gears to come")
+    content: Probability = quantity("share of future gears")
     confidence: Probability = quantity("confidence of each bound")
     at_least: float = quantity("at least")
     at_most: float = quantity("at most")
@@ -53,8 +53,8 @@ class Mixture(NamedTuple):
     def bounds(self, content: float) -> Bounds:
         """Return one-sided bounds of a share above a half, none below zero.
 
-        In the share of the confidence of the draws of the population each bound leaves
-        at least `content` of the members on its side.
+        Each bound holds for at least `content` of the members, in the stated share
+        (confidence) of the posterior draws.
         """
 
         def excess(reach, *parts):
@@ -91,14 +91,14 @@ class NextForce(Item):
 
 
 def stiffness_of_gears(draws: Mapping[str, np.ndarray]) -> Mixture:
-    """Return the stiffness of gears to come [N/mm as read], by draws of all sites."""
+    """Return the stiffness of future gears [N/mm as read], by draws of all sites."""
     mean, share = draws["stiffness"], draws["off_share"]
     sd = mean * _relative_sd(draws)
     return Mixture(mean, sd, np.stack([1.0 - share, share]))
 
 
 def force_of_gears(draws: Mapping[str, np.ndarray], deformation: float) -> Mixture:
-    """Return the size of the force of one reading of each gear to come [N].
+    """Return the size of the force of one reading of each future gear [N].
 
     The deformation is as read, with the sign of the data [mm].
     """
@@ -107,7 +107,7 @@ def force_of_gears(draws: Mapping[str, np.ndarray], deformation: float) -> Mixtu
     rest = np.hypot(rest, new_group_sd(draws, "operator"))
     own = force * _relative_sd(draws)
     zero = draws["run_offset_sd"] * _wide(draws["zero_off_ratio"])
-    # Ordinary and odd stiffness by ordinary and odd zero, [2, 2, draw].
+    # Stiffness of ordinary gears and outliers by zero of both, [2, 2, draw].
     sd = np.sqrt(own[:, None] ** 2 + zero**2 + rest**2)
     odd, odd_zero = draws["off_share"], draws["zero_off_share"]
     weight = np.stack([1.0 - odd, odd])[:, None] * np.stack([1.0 - odd_zero, odd_zero])
@@ -117,7 +117,7 @@ def force_of_gears(draws: Mapping[str, np.ndarray], deformation: float) -> Mixtu
 
 
 def next_gear(draws: Mapping[str, np.ndarray], seed: int) -> NextGear:
-    """Return the stiffness of gears to come."""
+    """Return the stiffness of future gears."""
     gears = stiffness_of_gears(draws)
     return NextGear(
         stiffness_N_per_mm=Interval.of(gears.sample(seed)),
@@ -133,7 +133,7 @@ def next_force(
     tested: float,
     seed: int = 0,
 ) -> NextForce:
-    """Return the force of gears to come at a deformation, of any sign [mm as read].
+    """Return the force of future gears at a deformation, of any sign [mm as read].
 
     The capacity is a size [N]; `tested` is the largest deformation read.
     """
@@ -182,11 +182,11 @@ def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
 
 
 def _relative_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the sd of the stiffness of ordinary and of odd gears, (2, d) [-]."""
+    """Return the sd of the stiffness of ordinary gears and of outliers, (2, d) [-]."""
     own = draws["specimen_sd"] * _wide(draws["off_ratio"])
     return np.hypot(own, new_group_sd(draws, "lot"))
 
 
 def _wide(ratio: np.ndarray) -> np.ndarray:
-    """Return the sd of ordinary and of odd gears in that of ordinary ones, (2, d)."""
+    """Return sds of ordinary gears and of outliers in that of the former, (2, d)."""
     return np.stack([np.ones_like(ratio), np.sqrt(1.0 + ratio**2)])

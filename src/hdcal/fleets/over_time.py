@@ -117,9 +117,9 @@ def _dated(gear, flagged, day, value, sd) -> pd.DataFrame:
     columns = {"gear": gear, "day": day, "value": value, "sd": sd, "flagged": flagged}
     table = pd.DataFrame(columns).dropna().sort_values("day", kind="stable")
     table["value"] -= table["value"].median()
-    odd = np.pad(table.pop("flagged").to_numpy(), 1)
-    # Several odd ones in a row may be a change.
-    table["left_out"] = odd[1:-1] & ~odd[:-2] & ~odd[2:]
+    flags = np.pad(table.pop("flagged").to_numpy(), 1)
+    # Several flagged gears in a row may be a change.
+    table["left_out"] = flags[1:-1] & ~flags[:-2] & ~flags[2:]
     return table.reset_index(drop=True)
 
 

@@ -1,4 +1,4 @@
-"""A fleet as a result: population, odd gears, and gears to come."""
+"""A fleet as a result: population, outliers, and future gears."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -11,7 +11,7 @@ from pydantic import Field, InstanceOf, computed_field
 from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.fleets.charts import curves_chart, gears_chart, time_chart
 from hdcal.fleets.gauge import GaugeRR
-from hdcal.fleets.gear_table import Flagged, GearLeftOut
+from hdcal.fleets.gear_table import Flagged, GearLeftOut, ranked
 from hdcal.fleets.model.gear_quantity import MOST_FALSE
 from hdcal.fleets.model.population import FittedFleet
 from hdcal.fleets.model.quantities import population_priors
@@ -75,13 +75,13 @@ class Group(Item):
 
 
 class Fleet(Result):
-    """Gears of one kind: their population, and the gears that are odd.
+    """Gears of one kind: their population, and the outliers.
 
     Attributes:
-        flagged: gears that are odd with a probability of `least_probability_off` or
-            more, those in their stiffness first.
-        at_one_size: whether gears of several sizes were compared at the gear file's, to
-            which then all numbers but those of gears.csv refer.
+        flagged: gears that are outliers with a probability of `least_probability_off`
+            or more, those in their stiffness first.
+        at_one_size: True if readings were converted to the sizes of the gear file. All
+            numbers except gears.csv then refer to those sizes.
         readings: of all gears, at the sizes of the gear file.
         gear_table: one row a gear, as in gears.csv.
     """
@@ -142,7 +142,7 @@ class Fleet(Result):
         return table.rename(columns=self.units.key)
 
     def to_datatree(self) -> "xr.DataTree":
-        """Return draws of the population and of gears to come, in groups of ArviZ."""
+        """Return draws of the population and of future gears, in groups of ArviZ."""
         import xarray as xr
 
         fit, chains = self.fit, int(self.fit.settings["chains"])
@@ -166,9 +166,7 @@ class Fleet(Result):
     def ranked(self, on_page: bool) -> list[dict[str, Any]]:
         """Return rows of the table: flagged gears first, then the least ordinary."""
         most = _MOST_LISTED if on_page else _LISTED
-        order = ["flagged", "probability_off"]
-        table = self.gear_table.sort_values(order, ascending=False, kind="stable")
-        return table.head(most).to_dict("records")
+        return ranked(self.gear_table).head(most).to_dict("records")
 
     @property
     def scatter(self) -> list[tuple[str, Interval | None, str, float]]:

@@ -21,7 +21,7 @@ _LEAST = 1e-300
 
 
 class Frequencies(NamedTuple):
-    """Share of each cause among gears to come (chain, draw, k); cause of each gear.
+    """Share of each cause among future gears (chain, draw, k); cause of each gear.
 
     The cause is an index (chain, draw, g); `chance` is the probability of each cause in
     each gear, given all gears (g, k).

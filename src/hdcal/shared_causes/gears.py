@@ -20,6 +20,10 @@ from hdcal.fleets.reading.readings import FleetReadings
 _FEWEST = 3
 # Rows of a gear beyond those that its stiffness and the offsets of its runs use up.
 _FEWEST_LEFT = 8
+# Equal readings in a row of a stuck channel, the steps of a force that may repeat where
+# a curve is flat, as a share of the range, and the share of its range and of its usual
+# step by which the other channel has to move on.
+_FEWEST_STUCK, _COARSE, _MOVES, _PACE = 5, 2e-3, 0.1, 0.5
 
 
 def read_gears(data: Any, gear: Any = None, **how: Any) -> FleetReadings:
@@ -45,7 +49,8 @@ def usable_gears(
     Raises:
         InputError: too few gears are left, or a gear cannot be used.
     """
-    case = usable(readings, skip_bad=skip_bad).case
+    # Residuals of a strong effect are not smooth either.
+    case = usable(readings, skip_bad=skip_bad, smooth=False).case
     gears = {gear: _one_gear(case, k) for k, gear in enumerate(case.specimen_labels)}
     faults = {label: _fault(gear) for label, gear in gears.items()}
     bad = {label: fault for label, fault in faults.items() if fault is not None}
@@ -102,8 +107,46 @@ def _fault(gear: Case) -> Finding | None:
         words = f"has {rows} rows in {runs} run{'s' if runs > 1 else ''}, too few"
         remedy = f"Read it {needed} times or more, or leave it out"
         return Finding(gear.name, words, remedy)
+    read, force = np.asarray(gear.records.deformation), np.asarray(gear.records.force)
+    units, run = gear.units, np.asarray(gear.records.run)
+    load, displacement = (units.load, force), (units.displacement, read)
+    for (name, held), (other, moving) in ((load, displacement), (displacement, load)):
+        if rows := _stuck(held, moving, run, display=held is force):
+            words = f"the {name} is stuck: {rows} equal readings in a row while the "
+            words += f"{other} moves on"
+            remedy = "Correct the record, or leave the gear out"
+            return Finding(gear.name, words, remedy)
     try:
         require_scatter(gear)
     except InputError as error:
         return error.findings[0]
     return None
+
+
+def _stuck(
+    held: np.ndarray, moving: np.ndarray, run: np.ndarray, *, display: bool
+) -> int:
+    """Return the most equal readings in a row while the other channel moves on, or 0.
+
+    A coarse display repeats readings where the curve is flat, which counts as stuck
+    unless `display`. In a hold the other channel may creep, more slowly than before.
+    """
+    steps, span = np.diff(np.unique(held)), np.ptp(held)
+    if not len(steps):
+        return 0
+    multiples = steps / steps.min()
+    coarse = np.allclose(multiples, multiples.round(), rtol=0.0, atol=1e-3)
+    if display and coarse and steps.min() > _COARSE * span:
+        return 0
+    step = np.abs(np.diff(moving))
+    pace = _PACE * np.median(step[np.diff(run) == 0])
+    # Equal readings of a display differ by less than one of its steps.
+    least = max(_MOVES, 2.0 * steps.min() / span) * np.ptp(moving)
+    begins = np.r_[True, (np.diff(held) != 0.0) | (np.diff(run) != 0)]
+    longest = 0
+    for rows in np.split(np.arange(len(held)), np.flatnonzero(begins)[1:]):
+        if len(rows) >= _FEWEST_STUCK and (
+            np.ptp(moving[rows]) > least and np.median(step[rows[:-1]]) > pace
+        ):
+            longest = max(longest, len(rows))
+    return longest

@@ -26,7 +26,7 @@ class SharedCause(Item):
     """One cause, which may be none or outside the library, over all gears.
 
     It is named for gears in which it alone has a probability of 0.9 or more. `gears`
-    is the number that have it, `share` that among gears to come. The log evidence
+    is the number that have it, `share` that among future gears. The log evidence
     is the natural log of the Bayes factor, if all gears have it, against no effect.
     """
 

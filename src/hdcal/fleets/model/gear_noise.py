@@ -1,9 +1,9 @@
 """Noise of the readings of every gear: ordinary gears differ little, a few a lot.
 
 The log likelihood of the noise σ of a gear is −ν (log σ + ½ s²/σ²), given its residual
-sd s with ν degrees of freedom. log σ is normal about the centre of all gears; of an odd
-gear it is wider by √(1 + ratio²). σ is integrated by Gauss and Hermite's rule about its
-mode.
+sd s with ν degrees of freedom. log σ is normal about the centre of all gears; of an
+outlier it is wider by √(1 + ratio²). σ is integrated by Gauss and Hermite's rule about
+its mode.
 """
 
 from collections.abc import Mapping
@@ -70,7 +70,8 @@ def noise_posterior(problem: GearNoise, values: Mapping) -> tuple[Cells, Cells]:
 
 def _mode(free, own, spread):
     """Return where log σ likely lies, in its own sds about the centre, and its sd."""
-    # What σ is alike far below the residual sd pulls exponentially: begin above it.
+    # Far below the residual sd the gradient grows exponentially, so Newton's method
+    # starts above it.
     mode = jnp.where(free > 0.0, own / spread, 0.0)
     mode = 2.0 * free * spread**2 * mode / (1.0 + 2.0 * free * spread**2)
     for _ in range(_NEWTON):
@@ -78,8 +79,9 @@ def _mode(free, own, spread):
         mode += (square - free * spread - mode) / (1.0 + 2.0 * spread * square)
     square = free * spread * jnp.exp(2.0 * (own - spread * mode))
     width = 1.0 / jnp.sqrt(1.0 + 2.0 * spread * square)
-    # Where nodes lie changes the integral by the error of the rule only: the gradient
-    # without them bends trajectories a little, and no draw, whose density is exact.
+    # Where nodes lie changes the integral by the error of the rule only. Their
+    # derivative is omitted. This affects the proposals slightly, not the accepted
+    # density.
     return jax.lax.stop_gradient((mode, width))
 
 
@@ -91,7 +93,7 @@ def _(problem: GearNoise, values: Mapping) -> Float[Array, ""]:
 
 @jax.jit
 def _moments(problem: GearNoise, values: Mapping):
-    """Return mean and sd of log σ and the probability of being odd; [gear]."""
+    """Return mean and sd of log σ and the probability of being an outlier; [gear]."""
 
     def one(draw):
         log_joint, log_sd = noise_posterior(problem, draw)
@@ -108,7 +110,7 @@ def _moments(problem: GearNoise, values: Mapping):
 def gear_noise(
     problem: GearNoise, values: Mapping
 ) -> tuple[NoiseNodes, np.ndarray, np.ndarray]:
-    """Return nodes of the noise of gears, their median [N], and the probability of odd.
+    """Return nodes of the noise of gears, their median [N], and P(outlier).
 
     They are averages over draws of the population, shape (g,).
     """

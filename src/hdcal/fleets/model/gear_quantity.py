@@ -1,14 +1,14 @@
 """One quantity of every gear: ordinary gears scatter about a centre, a few lie far out.
 
 A row of a gear holds y = m + a (θ + δ) + ε. θ of an ordinary gear is N(0, spread²),
-that of an odd gear is wider by √(1 + ratio²). δ ~ N(0, s σ²) is an error that all rows
+that of an outlier is wider by √(1 + ratio²). δ ~ N(0, s σ²) is an error that all rows
 of a gear share, ε ~ N(0, c σ²) that of the row. σ is the noise of the readings of the
 gear; it is integrated over `NoiseNodes`. Given σ and the kind of the gear all of it is
 Gaussian, so that a gear is integrated out exactly.
 
 m = centre (1 + lot) (1 + rig) + operator. Of the stiffness θ and δ are shares: a = m;
 of any other quantity a = 1. Zeros scatter from row to row: ε then has spread² more, and
-θ is zero but for odd gears, where it is N(0, (ratio · spread)²).
+θ is zero but for outliers, where it is N(0, (ratio · spread)²).
 
 Source:
     Box and Tiao, Biometrika 55 (1968), the wide component; Efron, Statistical Science
@@ -144,7 +144,7 @@ def _(problem: GearQuantity, values: Mapping) -> Float[Array, ""]:
 
 
 class DrawnGears(NamedTuple):
-    """θ of every gear, and its probability of being odd, for each population draw."""
+    """θ of every gear, and P(outlier), for each population draw."""
 
     apart: Float[Array, "t g"]
     off: Float[Array, "t g"]
@@ -173,6 +173,6 @@ def draw_gears(problem: GearQuantity, values: Mapping, seed: int) -> DrawnGears:
 
 
 def off_probability(log_joint: Float[Array, "g u k"]) -> Float[Array, " g"]:
-    """Return the probability of each gear being odd, by its cells."""
+    """Return the probability of each gear being an outlier, by its cells."""
     of_kind = jax.nn.logsumexp(log_joint, axis=1)
     return jax.nn.softmax(of_kind, axis=1)[:, 1]

@@ -80,7 +80,7 @@ def group_offsets(values: Mapping, kind: str) -> Float[Array, "k ..."]:
 def distinguished(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """Return the names of groups and the group of each label.
 
-    A single group, more than `MOST_GROUPS`, or as many as labels are none.
+    No groups if there is one group, more than `MOST_GROUPS`, or one per label.
     """
     names, index = np.unique(np.array(labels, str), return_inverse=True)
     if 1 < len(names) <= min(MOST_GROUPS, len(labels) - 1):
@@ -89,7 +89,7 @@ def distinguished(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
 
 
 def medians_of_groups(values: np.ndarray, group: np.ndarray) -> Grouping:
-    """Return groups of members by their medians, which odd members do not move."""
+    """Return groups of members by their medians, which outliers do not move."""
     middle = _medians(values, group)
     sd = robust_sd(values - middle[group])
     least = _NOTHING * np.max(np.abs(values))
@@ -101,9 +101,9 @@ def gains_of_rigs(
 ) -> Grouping:
     """Return the gains of rigs by least squares, as shares of the stiffness.
 
-    A gear that several rigs measured compares these as well as its slopes are known, a
-    gear of a single rig as well as gears are alike. A value is the relative slope of a
-    gear on a rig, with the variance of its error; all have shape (r,).
+    A gear measured on several rigs compares them with the error of its slopes; a gear
+    measured on one rig only with the scatter between gears. A value is the relative
+    slope of a gear on a rig, with the variance of its error; all have shape (r,).
     """
     rigs, weight = 1 + int(rig.max()), 1.0 / variance
     apart = value - _medians(value, rig)[rig]

@@ -58,7 +58,7 @@ class LineFits:
 
 
 def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFits:
-    """Fit the curves of every gear on every rig, by the index of that of a mounting.
+    """Fit one curve for each gear and rig; `rig` is the rig index of each mounting.
 
     Readings on an exact line scatter by the step of the force display [N].
     """
@@ -69,31 +69,31 @@ def line_fits(sums: MountingSums, rig: np.ndarray, step: float = 0.0) -> LineFit
         _summed(each, pair, len(pairs)) for each in (sums.products, sums.lagged)
     )
     free = np.bincount(pair, sums.rows - 1.0)
-    line = fit_terms(products, (0, 1, 2), free)
-    bend = fit_terms(products, (0, 2, 1), free)
-    squares = np.maximum(line.squares(products), 0.0)
+    loop_first = fit_terms(products, (0, 1, 2), free)
+    bend_first = fit_terms(products, (0, 2, 1), free)
+    squares = np.maximum(loop_first.squares(products), 0.0)
     freedom, square = (
         np.bincount(gear, values, gears)
-        for values in (free - line.known.sum(axis=1), squares)
+        for values in (free - loop_first.known.sum(axis=1), squares)
     )
     exact = square <= _ROUNDING * np.bincount(gear, products[:, 3, 3], gears)
     square = np.where(exact, freedom * step**2 / 12.0, square)
     known = (freedom > 0.0) & (square > 0.0)
     variance = np.where(known, square, 1.0) / np.where(known, freedom, 1.0)
-    follow = line.squares(lagged) / variance[gear]
+    follow = loop_first.squares(lagged) / variance[gear]
     correlation = _correlation(follow[known[gear]], freedom[known])
     wider = (1.0 + correlation) / (1.0 - correlation)
-    moved, swing = line.known[:, 0], _swing(sums)
+    moved, swing = loop_first.known[:, 0], _swing(sums)
     return LineFits(
         gear=gear[moved],
         rig=of_rig[moved],
-        slope=line.size[moved, 0],
-        slope_error=wider * line.error[moved, 0],
+        slope=loop_first.size[moved, 0],
+        slope_error=wider * loop_first.error[moved, 0],
         # The sense is ±1: a loop is twice its coefficient.
-        loop=2.0 * bend.size[moved, 2],
-        loop_error=4.0 * wider * bend.error[moved, 2],
-        bend=swing * line.size[moved, 2],
-        bend_error=swing**2 * wider * line.error[moved, 2],
+        loop=2.0 * bend_first.size[moved, 2],
+        loop_error=4.0 * wider * bend_first.error[moved, 2],
+        bend=swing * loop_first.size[moved, 2],
+        bend_error=swing**2 * wider * loop_first.error[moved, 2],
         freedom=np.where(known, freedom, 0.0) / wider,
         log_sd=0.5 * np.log(variance),
         correlation=correlation,

@@ -50,7 +50,7 @@ _SHAPES = ("loop", "bend")
 # Fewest gears that tell how much their loops or bends differ.
 _FEWEST = 3
 # Draws of the population over which the noise of gears and their probability of being
-# odd is averaged.
+# outliers is averaged.
 _AVERAGED = 100
 # Draws of the population for which every gear is drawn too: more for few gears, up to
 # a million in all, and at most as many as memory holds.
@@ -260,7 +260,7 @@ def _zeros(
 
 
 def _odd(problem: GearQuantity, values, seed: int) -> np.ndarray:
-    """Return the probability of each gear being odd; zero where nothing is known."""
+    """Return the probability of each gear being an outlier, 0 where not known."""
     known = np.any(np.asarray(problem.present) > 0.0, axis=1)
     odd = np.asarray(draw_gears(problem, values, seed).off).mean(axis=0)
     return np.where(known, odd, 0.0)

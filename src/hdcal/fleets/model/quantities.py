@@ -21,11 +21,13 @@ from hdcal.fleets.model.groups import (
 from hdcal.fleets.model.line_fits import LineFits
 from hdcal.fleets.reading.readings import MountingSums
 from hdcal.inference.force_model.priors import problem_priors
+from hdcal.inference.force_model.problem import without_texts
 
-# By judgement one gear in ten is odd in its stiffness, one in a hundred in another
-# quantity, some six times as far out as ordinary gears. The noise of gears on one rig
-# differs by 1 to 100 %. Lots and gains of rigs scatter about as gears of one lot do,
-# seldom a tenth of it or seven times as far; zeros of operators as those of mountings.
+# By judgement one gear in ten is an outlier in its stiffness, one in a hundred in
+# another quantity, some six times as far out as ordinary gears. The noise of gears on
+# one rig differs by 1 to 100 %. Lots and gains of rigs scatter about as gears of one
+# lot do, seldom a tenth of it or seven times as far; zeros of operators as those of
+# mountings.
 ODD_STIFFNESS, ODD = Prior("beta", (1.0, 9.0)), Prior("beta", (1.0, 99.0))
 ODD_RATIO = Prior("lognormal", (6.0, 0.7))
 NOISE_SPREAD = Prior("lognormal", (0.1, 1.2))
@@ -208,11 +210,7 @@ class Problems:
         priors = {**priors, "off_ratio": ODD_RATIO}
         priors |= {f"{kind}_ratio": GROUP_RATIO for kind in groups}
         return GearQuantity(
-            # Without their texts, which would be part of the compiled program.
-            priors={
-                n: Prior(p.family, tuple(map(float, p.numbers)))
-                for n, p in priors.items()
-            },
+            priors=without_texts(priors),
             value=dense("value", 0.0),
             error=dense("error", 1.0),
             present=present,
@@ -228,7 +226,7 @@ class Problems:
 
 
 def _start(values: np.ndarray, unit: float) -> dict[str, float]:
-    """Return rough centre, scatter (clear in a unit) and share of odd gears."""
+    """Return rough centre, scatter (clear in a unit) and share of outliers."""
     middle = float(np.median(values))
     sd = robust_sd(values - middle)
     far = np.sum(np.abs(values - middle) > _FAR * sd)

@@ -46,7 +46,7 @@ def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]
     name = "the table of gears" if in_memory else str(source)
     with FileFindings(name) as findings:
         if case.gear.theory == SPRING:
-            words = "its sizes have no meaning, as no gear file states sizes"
+            words = "sizes need a gear file, and none was given"
             findings.refuse(words, "Name one, as `gear` FILE.toml")
         table, _ = read_source(source, findings)
         places, specimen = _columns(table, case, findings)
@@ -56,7 +56,7 @@ def gear_sizes(source: Any, case: Case) -> tuple[np.ndarray, dict[str, Finding]]
         }
         findings.add_rows(_at_odds(table, sizes, case.gear))
         labels = pd.Series(table.grid.texts(specimen))
-        words = "its gear has a row already", "Keep the one that is right"
+        words = "duplicate row for this gear", "Remove one"
         twice = labels.duplicated().to_numpy()
         findings.add_rows((int(row), *words) for row in table.rows[twice])
     row_of = {label: row for row, label in enumerate(labels)}

@@ -20,9 +20,9 @@ from hdcal.errors import Finding, InputError
 from hdcal.fleets.reading.readings import (
     FleetReadings,
     RowSums,
-    modulus_left,
     reading_vectors,
     readings_of,
+    relative_modulus,
 )
 from hdcal.fleets.reading.record_faults import irregular
 from hdcal.screening.result import Observation
@@ -95,7 +95,7 @@ class BatchSums:
         warm = read.get("temperature", gear.reference_temperature)
         sense = np.ones(len(x)) if hidden else senses(x, index)
         sense = sense_at_turns(sense, x, force, index)
-        v = reading_vectors(x * modulus_left(gear, warm), sense, force)
+        v = reading_vectors(x * relative_modulus(gear, warm), sense, force)
         return each, index, v, RowSums.of(index, v, x)
 
     def _show(self, parts: list[Measurements]) -> None:

@@ -29,7 +29,7 @@ from hdcal.screening.result import Observation
 
 # Findings of screening that make a gear faulty; others are dealt with, and noted.
 _FAULTS = {
-    "after the largest force": "drop of the {load} for good",
+    "after the largest force": "permanent drop of the {load}",
     "jump of both": "jump of {load} and {displacement}",
     "jump of the deformation": "jump of the {displacement}",
     "jump of the force": "jump of the {load}",
@@ -66,7 +66,7 @@ def read_fleet(
         found, sums = parquet_readings(open_parquet(data, gear, **how), scheduler)
         return _with_faults(found, sums.left_out, sums.observed)
     if scheduler is not None:
-        words = "the data are no Parquet files, which alone are read by several"
+        words = "only Parquet files can be read on a Dask cluster"
         remedy = "Leave it out, or save the data as Parquet files"
         raise InputError([Finding("scheduler", words, remedy)])
     how |= {"encoding": encoding, "skip_bad": True}
@@ -122,9 +122,15 @@ def _with_faults(
 
 
 def usable(
-    readings: FleetReadings, gears: Any = None, *, skip_bad: bool = False
+    readings: FleetReadings,
+    gears: Any = None,
+    *,
+    skip_bad: bool = False,
+    smooth: bool = True,
 ) -> FleetReadings:
     """Return the readings of gears without a fault, at the sizes of the gear file.
+
+    A record that is not smooth is a fault unless `smooth` is False.
 
     Raises:
         InputError: a gear has a fault and may not be left out, fewer than three are
@@ -142,15 +148,15 @@ def usable(
             ratio, unsized = gear_sizes(table, readings.case)
             bad |= unsized
             readings = readings.at_one_size(ratio).without(unsized)
-        unlike = faults_among_gears(readings)
+        unlike = faults_among_gears(readings, smooth=smooth)
         bad |= unlike
         readings = readings.without(unlike)
         left = len(readings.case.specimen_labels)
         if bad and (left < _FEWEST or not skip_bad):
             wrong += _of_gears(bad)
         if left < _FEWEST:
-            words = f"of {many} gears {left} can be used: how much gears differ takes "
-            words += f"{_FEWEST} or more"
+            words = f"{left} of {many} gears can be used; the scatter between gears "
+            words += f"needs at least {_FEWEST}"
             remedy = "Correct the others; `columns` specimen=HEADER names the gear"
             wrong.append(Finding(readings.case.name, words, remedy))
         elif bad and not skip_bad:

@@ -226,7 +226,7 @@ def fleet_readings(case: Case) -> FleetReadings:
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
     (gear, run), index = np.unique(labels, axis=1, return_inverse=True)
     read, force = np.asarray(records.deformation), np.asarray(records.force)
-    x = read * modulus_left(case.gear, np.asarray(records.temperature))
+    x = read * relative_modulus(case.gear, np.asarray(records.temperature))
     v = reading_vectors(x, np.asarray(records.sense), force)
     return readings_of(case, gear, run, RowSums.of(index.ravel(), v, read))
 
@@ -242,7 +242,7 @@ def readings_of(
     return FleetReadings(case, found, side)
 
 
-def modulus_left(gear: Gear, temperature):
+def relative_modulus(gear: Gear, temperature):
     """Return the modulus at temperatures [°C] over that at the reference."""
     loss, _ = distributions.moments(gear.priors["alpha"])
     return 1.0 - loss * (temperature - gear.reference_temperature)

@@ -1,7 +1,7 @@
 """Faults in the records of gears, found by comparison with the other gears.
 
 Screening finds jumps, drops and saturation in a record. Comparison finds a record that
-follows no curve, one in another unit, and two parts under one label. A gear with a
+is not smooth, one in another unit, and two parts under one label. A gear with a
 fault is left out whole, since a fault is no scatter between gears.
 """
 
@@ -94,12 +94,18 @@ def irregular(
     return odd | (sums.products[:, 0, 3] <= 0.0)
 
 
-def faults_among_gears(readings: FleetReadings) -> dict[str, Finding]:
-    """Return gears whose record at one size differs from the others, with its fault."""
+def faults_among_gears(
+    readings: FleetReadings, *, smooth: bool = True
+) -> dict[str, Finding]:
+    """Return gears whose record at one size differs from the others, with its fault.
+
+    A record that is not smooth is a fault only where that is asked for.
+    """
     case, sums = readings.case, readings.sums
     bad: dict[str, Finding] = {}
     # Each test is of the gears that passed the one before.
-    for test in (_no_slope, _no_curve, _two_parts):
+    tests = [_no_slope, *([_not_smooth] if smooth else []), _two_parts]
+    for test in tests:
         if len(sums.gear):
             for gear, problem in test(readings, sums):
                 label = case.specimen_labels[gear]
@@ -135,8 +141,8 @@ def _no_slope(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
         yield gear, f"{words}: check its units, and whether it is of this kind"
 
 
-def _no_curve(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
-    """Yield gears whose residuals are far larger than those of others, and no noise."""
+def _not_smooth(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
+    """Yield gears with residuals far larger than those of others that are not noise."""
     fits, unit = curve_fits(sums), readings.case.units.load_unit
     usual = float(np.median(fits.sd))
     # Readings that are spread evenly have the variance of their range over twelve.
@@ -146,9 +152,9 @@ def _no_curve(readings: FleetReadings, sums: MountingSums) -> Iterator[_Fault]:
     for gear, sd in zip(sums.gear[far], fits.sd[far], strict=True):
         yield (
             gear,
-            f"its readings follow no curve: they leave one by {sd:.2g} {unit} (sd), "
-            f"those of the other gears by {usual:.2g} {unit}. A break, a channel that "
-            "stood still, or two parts under one label",
+            "its readings do not follow a smooth curve: residual sd "
+            f"{sd:.2g} {unit}, other gears {usual:.2g} {unit}. Possible causes: a "
+            "break, a stuck channel, or two parts under one label",
         )
 
 
