@@ -24,8 +24,9 @@ from hdcal.inference.force_model.assembly import (
 from hdcal.inference.force_model.identifiability import linearise
 from hdcal.inference.force_model.noise_form import noise_grows, pilot_fit
 from hdcal.inference.force_model.priors import problem_priors
-from hdcal.inference.force_model.problem import MEMBERS, Problem, build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.force_model.structure import decide_structure
+from hdcal.inference.force_model.values import MEMBERS
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.physics.effect import Effect

@@ -15,8 +15,8 @@ from hdcal.inference.checks import Check, listed
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
 from hdcal.inference.force_model.padding import pad_records
-from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
-from hdcal.inference.force_model.values import predict_rows
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.values import MEMBER_SD, MEMBERS, predict_rows
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)

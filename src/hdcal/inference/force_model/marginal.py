@@ -8,7 +8,7 @@ r = Z w + e with standard normal scores w. With A = I + Z'Z and u = Z'r:
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -19,20 +19,23 @@ from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 from hdcal.inference.force_model.padding import measured
-from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
 from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
     log_volume,
     whiten,
 )
 from hdcal.inference.force_model.values import (
-    Values,
+    MEMBER_SD,
+    MEMBERS,
     member_base,
     predict_rows,
     with_rounding,
 )
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Values
 from hdcal.physics.chain import linear_coefficients
+
+if TYPE_CHECKING:
+    from hdcal.inference.force_model.problem import Problem
 
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
@@ -85,7 +88,7 @@ class _Rows(NamedTuple):
     log_scale: Float[Array, ""]
 
 
-def linear_part(problem: Problem, values: Values) -> Linear:
+def linear_part(problem: "Problem", values: Values) -> Linear:
     """Return the residual that the integrated members have to explain.
 
     Values of integrated members, if there are any, are left out.
@@ -106,7 +109,7 @@ def linear_part(problem: Problem, values: Values) -> Linear:
     return Linear(rows.residual, jnp.hstack(design), rows.log_scale)
 
 
-def _root(problem: Problem, values: Values, kind: str) -> Float[Array, "members m"]:
+def _root(problem: "Problem", values: Values, kind: str) -> Float[Array, "members m"]:
     """Return a root of the prior covariance of the members of a kind.
 
     Runs and specimens are deviations from the mean of the tested ones.
@@ -123,7 +126,7 @@ def contrasts(count: int) -> Float[Array, "count k"]:
     return jnp.asarray(helmert(count).T)
 
 
-def _measured_rows(problem: Problem, values: Values) -> _Rows:
+def _measured_rows(problem: "Problem", values: Values) -> _Rows:
     records, before = problem.rows, problem.before
     mean, noise = predict_rows(problem, values, records, None)
     sd = with_rounding(noise, problem.step).sd[0]
@@ -145,7 +148,7 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
     )
 
 
-def _compressed_rows(problem: Problem, values: Values) -> _Rows:
+def _compressed_rows(problem: "Problem", values: Values) -> _Rows:
     assert problem.blocks is not None
     correlation = values.get(CORRELATION, 0.0)
     blocks = problem.blocks.whitened(correlation)
@@ -175,10 +178,8 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     )
 
 
-def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
-    """Draw the integrated members, if any, given the shared parameters of one draw."""
-    if not isinstance(problem, Problem) or not problem.integrated:
-        return {}
+def draw_members(problem: "Problem", values: Values, key: Key[Array, ""]) -> dict:
+    """Draw the integrated members given the shared parameters of one draw."""
     scores, drawn = linear_part(problem, values).draw(key), {}
     for kind in problem.integrated:
         root = _root(problem, values, kind)

@@ -5,6 +5,7 @@ of them the stated prior is exact.
 """
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpyro
@@ -14,13 +15,14 @@ from jax.nn import log_sigmoid, softplus
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.padding import measured
-from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
 from hdcal.inference.force_model.values import stiffness, with_gains
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
+
+if TYPE_CHECKING:
+    from hdcal.inference.force_model.problem import Problem
 
 CONTACT = "deformation_offset"
 SLACK = "seating_slack.clearance"
@@ -28,7 +30,7 @@ SLACK = "seating_slack.clearance"
 _AMPLITUDE = 0.1
 
 
-def declare(problem: Problem) -> None:
+def declare(problem: "Problem") -> None:
     """Declare the joint density of parameters and data of the force model."""
     priors, values = problem.priors, sample_stiffness(problem.priors)
     values["alpha"] = sample_site("alpha", priors["alpha"])
@@ -51,7 +53,7 @@ def declare(problem: Problem) -> None:
         values[CONTACT] = _sample_contact(problem, values)
     _sample_members(problem, values)
     numpyro.deterministic("stiffness", stiffness(problem, values))
-    numpyro.factor("force", log_likelihood(problem, values))
+    numpyro.factor("force", problem.log_likelihood(values))
 
 
 def sample_site(name: str, prior: Prior):
@@ -112,7 +114,7 @@ def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
     return values
 
 
-def _sample_contact(problem: Problem, values: Mapping):
+def _sample_contact(problem: "Problem", values: Mapping):
     """Sample the point of first contact ω₀ with slack c, by where slack is taken up.
 
     Rows of a gear that is pressed determine ω₀ + c well, and neither ω₀ nor c. Rows of
@@ -124,7 +126,7 @@ def _sample_contact(problem: Problem, values: Mapping):
     return sample_moved(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)
 
 
-def _sample_noise(problem: Problem, values: dict) -> None:
+def _sample_noise(problem: "Problem", values: dict) -> None:
     """Sample the noise: its sd, the correlation of neighbours, and its effects.
 
     Where neighbours are highly correlated rows determine what each adds to the one
@@ -144,7 +146,7 @@ def _sample_noise(problem: Problem, values: dict) -> None:
 
 
 def _sample_effect(
-    problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
+    problem: "Problem", effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
     """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
@@ -156,7 +158,7 @@ def _sample_effect(
             values[name] = sample_site(name, prior)
 
 
-def _sample_members(problem: Problem, values: dict) -> None:
+def _sample_members(problem: "Problem", values: dict) -> None:
     """Sample scales of specimens and discrepancy, and members if not integrated.
 
     Runs and specimens are deviations from the mean of the tested ones.
@@ -195,14 +197,14 @@ def _sample_deviations(name: str, sd, known_sd, count: int):
     return numpyro.deterministic(name, sd / spread * score)
 
 
-def _mean_sd(problem: Problem, values: Mapping, members: int):
+def _mean_sd(problem: "Problem", values: Mapping, members: int):
     """Return about how well the mean reading of a member is known [N]."""
     known = _mean_square(problem, problem.rows.force_sd)
     variance = values["sigma"] ** 2 + known + problem.step**2 / 12.0
     return jnp.sqrt(variance * members / problem.count)
 
 
-def _mean_square(problem: Problem, column):
+def _mean_square(problem: "Problem", column):
     """Return the mean square of a column over the measured rows."""
     real = measured(len(column), problem.count)
     return jnp.sum(jnp.where(real, column**2, 0.0)) / problem.count

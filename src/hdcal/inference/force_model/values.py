@@ -9,22 +9,27 @@ temperature α, effects and leftover are in terms of what was read; E₀, K and 
 stiffness are true. What no certificate states is left out.
 """
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.inference.sampled_problem import Values
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
 if TYPE_CHECKING:
     from hdcal.inference.force_model.problem import Problem
 
-# Float scalars and arrays by site name.
-Values = Mapping[str, Any]
-
+# Site of each kind of parameter with one value per run, specimen or function of the
+# discrepancy, and site of the sd between runs and between specimens.
+MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "discrepancy": "gap_weights",
+}
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # Least noise sd that rounded readings distinguish from none, in steps; twice as much
 # noise is raised by 5e-4 of it.
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
