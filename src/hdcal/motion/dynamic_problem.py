@@ -23,7 +23,10 @@ from hdcal.inference.force_model.model import sample_site, sample_stiffness
 from hdcal.inference.force_model.padding import measured, pad_records
 from hdcal.inference.force_model.priors import influence_prior, unit_stiffness
 from hdcal.inference.force_model.problem import Problem, case_reading, without_texts
-from hdcal.inference.force_model.values import where_read, with_gains
+from hdcal.inference.force_model.values import (
+    apply_gains,
+    stiffness_at_read_reference,
+)
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sampled_problem import Sampled, Values
 from hdcal.physics.dynamics import natural_frequency, ring_mass
@@ -122,7 +125,8 @@ def oscillation(problem: DynamicProblem, values: Values) -> dict:
     These are `warm_stiffness` [N/mm], `damping` [N·s/mm] and `natural_frequency` [Hz].
     """
     stiffness = values["K"] * values["E0"] * problem.unit_stiffness
-    warm = where_read(values, stiffness) * (1.0 - values["alpha"] * problem.rise)
+    reference = stiffness_at_read_reference(values, stiffness)
+    warm = reference * (1.0 - values["alpha"] * problem.rise)
     return {
         "stiffness": stiffness,
         "warm_stiffness": warm,
@@ -144,7 +148,7 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
     derived = oscillation(problem, values)
     stiffness = derived["warm_stiffness"] * stiffness_shares(problem, values["alpha"])
     parts = values["mass"], derived["damping"], stiffness
-    gear = LinearGear(*(with_gains(values, part) for part in parts))
+    gear = LinearGear(*(apply_gains(values, part) for part in parts))
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
     rows = problem.time, problem.force, start
     return linear_response(gear, *rows)[:, 0] + values["deformation_offset"]

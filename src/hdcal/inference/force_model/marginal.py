@@ -29,6 +29,7 @@ from hdcal.inference.force_model.values import (
     MEMBERS,
     member_base,
     predict_rows,
+    rounding_variance,
     with_rounding,
 )
 from hdcal.inference.sampled_problem import Values
@@ -64,10 +65,10 @@ class Linear(eqx.Module):
         factor, mean = self._solved()
         # A sum of squares: the difference r'r − u'A⁻¹u would lose its digits where
         # members spread much wider than the noise.
-        left = self.residual - self.design @ mean
-        square = left @ left + mean @ mean
-        volume = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
-        return -0.5 * (square + volume) - self.log_scale
+        rest = self.residual - self.design @ mean
+        square = rest @ rest + mean @ mean
+        log_det = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
+        return -0.5 * (square + log_det) - self.log_scale
 
     def draw(self, key: Key[Array, ""]) -> Float[Array, " m"]:
         """Draw the scores from their distribution given y."""
@@ -84,7 +85,7 @@ class _Rows(NamedTuple):
 
     residual: Float[Array, " r"]
     columns: dict[str, tuple[Float[Array, " r"], Int[Array, " r"]]]
-    gap: Float[Array, "r m"] | None
+    discrepancy: Float[Array, "r m"] | None
     log_scale: Float[Array, ""]
 
 
@@ -101,8 +102,8 @@ def linear_part(problem: "Problem", values: Values) -> Linear:
     for kind in problem.integrated:
         root = _root(problem, values, kind)
         if kind == "discrepancy":
-            assert rows.gap is not None
-            design.append(rows.gap @ root)
+            assert rows.discrepancy is not None
+            design.append(rows.discrepancy @ root)
         else:
             column, label = rows.columns[kind]
             design.append(column[:, None] * root[label])
@@ -115,7 +116,8 @@ def _root(problem: "Problem", values: Values, kind: str) -> Float[Array, "member
     Runs and specimens are deviations from the mean of the tested ones.
     """
     if kind != "discrepancy":
-        return values[MEMBER_SD[kind]] * contrasts(getattr(problem, f"{kind}s"))
+        count = {"run": problem.runs, "specimen": problem.specimens}[kind]
+        return values[MEMBER_SD[kind]] * contrasts(count)
     assert problem.discrepancy is not None
     sd = problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
     return jnp.diag(sd)
@@ -139,12 +141,12 @@ def _measured_rows(problem: "Problem", values: Values) -> _Rows:
         scaled = (jnp.where(real, 1.0 / sd, 0.0) * column.T).T
         return scaled if before is None else whiten(scaled, before, correlation)
 
-    volume = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
+    log_scale = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
     return _Rows(
         white(records.force - mean),
         {"run": (white(jnp.ones_like(sd)), jnp.asarray(records.run))},
         None if problem.columns is None else white(problem.columns),
-        volume + log_volume(following, correlation),
+        log_scale + log_volume(following, correlation),
     )
 
 
@@ -153,7 +155,7 @@ def _compressed_rows(problem: "Problem", values: Values) -> _Rows:
     correlation = values.get(CORRELATION, 0.0)
     blocks = problem.blocks.whitened(correlation)
     # Sheppard's correction, which is exact to 2 exp(−2π²σ²/step²).
-    square = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    square = values["sigma"] ** 2 + blocks.known_sd**2 + rounding_variance(problem.step)
     sd = jnp.sqrt(square)
     factor = blocks.factor / sd
     slope = linear_coefficients(
@@ -164,7 +166,7 @@ def _compressed_rows(problem: "Problem", values: Values) -> _Rows:
     )
     core = jnp.broadcast_to(core, (len(blocks.count), CORE))
     fitted = jnp.einsum("gij,gj->gi", factor[..., :CORE], core)
-    volume = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
+    log_scale = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
     columns = {
         "run": (factor[..., ONE], blocks.run),
         "specimen": (factor[..., :CORE] @ slope, blocks.specimen),
@@ -174,7 +176,7 @@ def _compressed_rows(problem: "Problem", values: Values) -> _Rows:
         (factor[..., -1] - fitted).reshape(-1),
         {n: (c.reshape(-1), jnp.repeat(of, size)) for n, (c, of) in columns.items()},
         factor[..., CORE:-1].reshape(fitted.size, -1),
-        volume + log_volume(jnp.sum(blocks.following), correlation),
+        log_scale + log_volume(jnp.sum(blocks.following), correlation),
     )
 
 

@@ -128,7 +128,10 @@ class Problem(Sampled):
 
 
 def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return priors without unit and source, for which JAX would compile anew."""
+    """Return priors without unit and source.
+
+    Strings are static parts of a pytree: other ones would be compiled again.
+    """
     return {
         name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
         for name, prior in priors.items()
@@ -155,10 +158,10 @@ def build_problem(
     effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     form = structure or decide_structure(case, effects)
-    leftover = build_discrepancy(records, effects) if form.with_gap else None
+    discrepancy = build_discrepancy(records, effects) if form.with_gap else None
     before = previous_rows(records) if form.correlated else None
     compressed = not (form.rounded or effects)
-    kept = _kept_rows(records, reading, leftover, before, compressed=compressed)
+    kept = _kept_rows(records, reading, discrepancy, before, compressed=compressed)
     integrated = []
     if not (form.rounded or any(effect.mixture for effect in effects)):
         # Through an effect the force need not be linear in the stiffness.
@@ -172,7 +175,7 @@ def build_problem(
         reading=reading,
         **kept,
         count=len(records.force),
-        discrepancy=leftover,
+        discrepancy=discrepancy,
         step=case.gear.force_resolution,
         effects=effects,
         rounded=form.rounded,
@@ -189,14 +192,14 @@ def build_problem(
 def _kept_rows(
     records: Records,
     reading: Reading,
-    leftover: Discrepancy | None,
+    discrepancy: Discrepancy | None,
     before: np.ndarray | None,
     *,
     compressed: bool,
 ) -> dict[str, Any]:
     """Return the fields of a problem that hold rows, compressed if they can be."""
     padded, rows = pad_records(records), len(records.force)
-    columns = discrepancy_columns(leftover, padded)
+    columns = discrepancy_columns(discrepancy, padded)
     if compressed:
         base = np.asarray(_base_columns(padded, reading))[:rows]
         design = base if columns is None else np.hstack([base, columns[:rows]])
