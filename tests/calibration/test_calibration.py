@@ -25,9 +25,7 @@ from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
 from hdcal.errors import InputError
 from hdcal.inference import laplace
-from hdcal.inference.force_model.likelihood import log_likelihood
-from hdcal.inference.force_model.marginal import draw_members
-from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
 from hdcal.physics.effects.scatter import Scatter
@@ -157,9 +155,9 @@ def test_drawn_members_do_not_count_in_the_likelihood():
     problem = build_problem(case, effect_priors(), chosen, structure=form)
     assert problem.blocks is None and problem.integrated == ("discrepancy",)
     shared = draw_truth(problem, jax.random.key(0))
-    drawn = jax.jit(draw_members)(problem, shared, jax.random.key(1))
+    drawn = jax.jit(Problem.draw_members)(problem, shared, jax.random.key(1))
     assert np.std(drawn["gap_weights"]) > 0.0
-    compiled = jax.jit(log_likelihood)
+    compiled = jax.jit(Problem.log_likelihood)
     alone, both = (float(compiled(problem, one)) for one in (shared, shared | drawn))
     assert np.isfinite(alone) and both == alone
 

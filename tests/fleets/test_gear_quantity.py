@@ -14,7 +14,6 @@ from hdcal.fleets.model.gear_quantity import (
     draw_gears,
     gear_posterior,
 )
-from hdcal.inference.force_model.likelihood import log_likelihood
 
 # One-way layouts. Davies, Statistical Methods in Research and Production (1947): yields
 # of dyestuff from six batches; lme4 gives the sds 42.0 and 49.5 by REML. NIST StRD:
@@ -110,7 +109,7 @@ def test_density_and_gears_are_those_of_the_whole_covariance(relative, by_row):
     share = np.log([1.0 - values["off_share"], values["off_share"]])
     each = [dense(one, gear, values) for gear in range(GEARS)]
     expected = sum(np.logaddexp.reduce(log + share) for log, _, _ in each)
-    assert float(log_likelihood(one, values)) == pytest.approx(expected, abs=1e-9)
+    assert float(one.log_likelihood(values)) == pytest.approx(expected, abs=1e-9)
     found = gear_posterior(one, values)
     for gear, (log, mean, variance) in enumerate(each):
         np.testing.assert_allclose(found.log_joint[gear, 0], log + share, rtol=1e-10)
@@ -149,7 +148,7 @@ def test_the_noise_of_a_gear_is_integrated(freedom, spread, away):
     expected -= np.log(np.sum(np.exp(-0.5 * place**2)))
     # Very wide kinds of a gear with hardly any readings are rough, and rare.
     close = 0.02 if spread < 0.5 or freedom > 1.0 else 0.1
-    assert float(log_likelihood(one, values)) == pytest.approx(expected, abs=close)
+    assert float(one.log_likelihood(values)) == pytest.approx(expected, abs=close)
 
 
 def reml(layout) -> float:
@@ -168,7 +167,7 @@ def reml(layout) -> float:
     def lost(log_sd):
         def at(place):
             usual = {"off_share": 0.0, "off_ratio": 1.0, "centre": place}
-            return log_likelihood(one, usual | {"spread": jnp.exp(log_sd)})
+            return one.log_likelihood(usual | {"spread": jnp.exp(log_sd)})
 
         return -jax.nn.logsumexp(jax.vmap(at)(places))
 

@@ -15,8 +15,7 @@ from structures import form_of
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.gear_file.certificates import ForceCertificate, certificate_priors
 from hdcal.data.priors import effect_priors
-from hdcal.inference.force_model.likelihood import log_likelihood
-from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.posterior import Posterior
 
 GAUGES = {"force_gain": 0.02, "deformation_gain": -0.013, "temperature_offset": 7.0}
@@ -48,7 +47,7 @@ def test_the_likelihood_of_what_was_read_is_the_same(kind: str):
     plain = build_problem(case, effect_priors(), effects, structure=form)
     truth = draw_truth(plain, jax.random.key(1))
     case = simulate(plain, case, truth, jax.random.key(2))
-    density, found = jax.jit(log_likelihood), []
+    density, found = jax.jit(Problem.log_likelihood), []
     for gear in (case.gear, certified(case.gear)):
         one = with_gear(case, gear)
         form = form_of(one, effects, with_gap)

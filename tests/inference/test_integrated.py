@@ -12,9 +12,9 @@ from structures import form_of
 
 from hdcal.data.priors import effect_priors
 from hdcal.errors import InputError
-from hdcal.inference.force_model import likelihood
 from hdcal.inference.force_model.marginal import Linear, contrasts, draw_members
-from hdcal.inference.force_model.problem import MEMBERS, build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
+from hdcal.inference.force_model.values import MEMBERS
 
 # Known covariates, number of specimens, stated sds of a reading, leftover.
 STRUCTURES = {
@@ -25,7 +25,7 @@ STRUCTURES = {
     "leftover": (set(), 1, (0.0,), True),
     "independent": ({"run"}, 1, (0.0,), False),
 }
-log_likelihood = jax.jit(likelihood.log_likelihood)
+log_likelihood = jax.jit(Problem.log_likelihood)
 
 
 def values_of(seed: int) -> dict:

@@ -11,9 +11,8 @@ from structures import form_of
 
 from hdcal.data.priors import effect_priors
 from hdcal.inference.force_model.identifiability import linearise
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.padding import bucket_size
-from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
 
 
 def test_few_lengths_hold_every_number_of_rows():
@@ -68,7 +67,7 @@ def test_the_likelihood_of_rounded_rows_is_that_of_the_measured_ones(rounded):
         stats.norm.cdf(high) - stats.norm.cdf(low),
         stats.norm.sf(low) - stats.norm.sf(high),
     )
-    found = float(jax.jit(log_likelihood)(problem, values))
+    found = float(jax.jit(Problem.log_likelihood)(problem, values))
     assert found == pytest.approx(np.log(chance).sum(), rel=1e-7)
 
 

@@ -15,7 +15,8 @@ from hdcal.calibration.known_effects import check_effect_priors
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
 from hdcal.inference.force_model import model
-from hdcal.inference.force_model.problem import MEMBER_SD, build_problem
+from hdcal.inference.force_model.problem import build_problem
+from hdcal.inference.force_model.values import MEMBER_SD
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS

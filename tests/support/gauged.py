@@ -6,7 +6,7 @@ from rigs import make_gear
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior
-from hdcal.inference.force_model.values import as_read
+from hdcal.inference.force_model.values import stiffness_as_read
 
 SDS = {"force_gain": 0.005, "deformation_gain": 0.003, "temperature_offset": 10.0}
 
@@ -25,6 +25,6 @@ def with_gear(case: Case, gear: Gear) -> Case:
 def told(values: dict, **gauges) -> dict:
     """Return what reads the same where the gauges have these gains and this offset."""
     known = {**values, **gauges}
-    seen = as_read(known, 1.0)
+    seen = stiffness_as_read(known, 1.0)
     known |= {name: known[name] / seen for name in ("K", "stiffness") if name in known}
     return known

@@ -8,7 +8,6 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 
 from hdcal.inference.distributions import distribution
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.laplace import potential, values_at
 
 
@@ -47,7 +46,7 @@ def off_the_stated_density(problem, names, coordinates: Mapping) -> np.ndarray:
     def off(position):
         flat, unravel = ravel_pytree(position)
         values = values_at(problem, position)
-        stated = log_prior(problem, values) + log_likelihood(problem, values)
+        stated = log_prior(problem, values) + problem.log_likelihood(values)
         moved = jnp.linalg.slogdet(jax.jacfwd(named)(flat, unravel))[1]
         return -potential(problem, position) - stated - moved
 

@@ -24,8 +24,9 @@ from hdcal.inference.force_model.assembly import (
 from hdcal.inference.force_model.identifiability import linearise
 from hdcal.inference.force_model.noise_form import noise_grows, pilot_fit
 from hdcal.inference.force_model.priors import problem_priors
-from hdcal.inference.force_model.problem import MEMBERS, Problem, build_problem
+from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.force_model.structure import decide_structure
+from hdcal.inference.force_model.values import MEMBERS
 from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.physics.effect import Effect
@@ -72,8 +73,8 @@ def calibrate(
     are those of each chain.
 
     The effects are names of the registry; the theory is by default the gear's. The
-    model has a leftover discrepancy, orthogonal to the base model, by `with_gap`, by
-    default where the readings show a bend and never with effects. With `adapt_noise`
+    model has a discrepancy, orthogonal to the base model, by `with_gap`, by default
+    where the readings show a bend and never with effects. With `adapt_noise`
     the noise grows with the force where it clearly does. `progress` is called with the
     numbers of iterations done and in all.
 
@@ -104,7 +105,7 @@ def calibrate(
         correlation_check(found.values, len(records.force), form.why_independent),
     ]
     if not requested and with_gap is None:
-        # An effect, or a requested bend, is a reason for another stiffness.
+        # An effect or a requested discrepancy changes the stiffness.
         checks += [
             line_check(records, stiffness, sized=theory != SPRING),
             straight_check(case, stiffness),
@@ -136,8 +137,8 @@ def _may_grow(case: Case, effects: Sequence[type[Effect]]) -> bool:
 def _with_constant_part(case: Case) -> Case:
     """Return a case in which σ is the part of the noise that does not grow.
 
-    Were it next to nothing, the least force that is possible would be a wall at which
-    a sampler fails. What the gear file states stays.
+    Near zero it would make the density discontinuous at the smallest force, where a
+    sampler fails. What the gear file states is kept.
     """
     gear, shipped = case.gear, rig_priors()["sigma"]
     if gear.priors["sigma"].source != shipped.source:

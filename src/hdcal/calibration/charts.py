@@ -24,7 +24,7 @@ from hdcal.report.charts.chart_spec import (
 from hdcal.screening.result import DROPPED, OUTSIDE
 
 _MOST_COLUMNS = 3
-# What was left out and is part of the curve; a wild reading would flatten the picture.
+# Segments that are part of the curve; an outlier would flatten the picture.
 _PARTS_OF_CURVE = (DROPPED, OUTSIDE)
 # Marker of each direction, and its colour where colours show nothing else.
 _MARKERS = {1: ("^", INK), -1: ("v", GREY)}
@@ -54,7 +54,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
             mark
             for branch in branches(bands)
             # Around their medians both directions have the same bands, unless the
-            # leftover discrepancy differs between them.
+            # discrepancy differs between them.
             if branch.temperature == level
             and (branch.loading or (gap is not None and gap.looped))
             for mark in branch_marks(bands, branch, around_model=True)

@@ -27,7 +27,7 @@ from hdcal.errors import Finding
 @click.option(
     "--with-gap/--no-gap",
     default=None,
-    help="Model a smooth leftover discrepancy, or leave it out [default: model it if "
+    help="Model a smooth discrepancy, or leave it out [default: model it if "
     "the readings show a bend; never with an effect].",
 )
 @click.option(

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from hdcal.data.case import Case
 from hdcal.data.findings import did_you_mean
 from hdcal.errors import Finding, Findings
-from hdcal.inference.force_model.problem import MEMBER_SD
+from hdcal.inference.force_model.values import MEMBER_SD
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS

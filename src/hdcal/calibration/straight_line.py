@@ -1,4 +1,8 @@
-"""Last checks of a stiffness: a robust straight line, and the straight part."""
+"""Last checks of a stiffness: a robust straight line, and the straight part.
+
+Whether the model has a discrepancy or correlated noise is decided in
+`hdcal.inference.force_model.structure`.
+"""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +21,7 @@ from hdcal.screening.turning_points import MEDIAN_SIZE
 if TYPE_CHECKING:
     from hdcal.inference.checks import Check
 
-# So many rows decide a line; of more every second, third, … is taken.
+# Largest number of rows of a fit; of more rows every second, third, … is used.
 _MOST_ROWS = 20_000
 
 
@@ -32,7 +36,7 @@ def robust_line(records: Records) -> RobustLine | None:
     """Return the slope of the readings, as read; None where nothing was deformed.
 
     Zeros of runs and a linear dependence on temperature are fitted too. The loss is
-    Huber's, smooth (`soft_l1`): wild readings count little.
+    Huber's, smooth (`soft_l1`): outliers count little.
     """
     from scipy.optimize import least_squares
 
@@ -78,8 +82,8 @@ def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> "Chec
     if line is None:
         return Check(name, "note", "no slope: the {displacement} does not change")
     low, middle, high = np.quantile(stiffness, [0.025, 0.5, 0.975])
-    apart = abs(middle - line.slope)
-    is_near = apart <= max(
+    difference = abs(middle - line.slope)
+    is_near = difference <= max(
         (high - low) / 2.0 + line.half_width, LEAST_DIFFERENCE * abs(line.slope)
     )
     words = (

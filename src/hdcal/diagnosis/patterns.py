@@ -22,7 +22,7 @@ from hdcal.evidence.linear_problem import LinearProblem, padded_records
 from hdcal.inference.force_model.noise_form import loop_cells
 from hdcal.inference.force_model.residual_shapes import (
     Correlated,
-    Structure,
+    ResidualFinding,
     Whitened,
     find_structure,
 )
@@ -205,7 +205,7 @@ def find_patterns(problem: LinearProblem, case: Case) -> tuple[Seen, ...]:
     base = problem.X if known_alpha else np.delete(problem.X, _MODULUS_LOSS, axis=1)
     found = _found(problem, case, sign * problem.y, base, tried)
     # Of loops with the same statement the clearest counts.
-    once: dict[str, Structure] = {}
+    once: dict[str, ResidualFinding] = {}
     for each in found:
         contrast = tried[each.name]
         same = contrast.words if contrast.covariate == "direction" else each.name
@@ -223,7 +223,7 @@ def _found(
     y: np.ndarray,
     base: np.ndarray,
     tried: dict[str, Contrast],
-) -> tuple[Structure, ...]:
+) -> tuple[ResidualFinding, ...]:
     """Search contrasts within runs first, then between runs.
 
     Slope and zero are free; the other columns of the base are held by their priors.
@@ -253,7 +253,11 @@ def _found(
 
 
 def _seen(
-    contrast: Contrast, found: Structure, swing: float, quantile: float, case: Case
+    contrast: Contrast,
+    found: ResidualFinding,
+    swing: float,
+    quantile: float,
+    case: Case,
 ) -> Seen:
     size, half = abs(found.coefficient) * swing, quantile * found.error * swing
     words = contrast.words.replace("{way}", contrast.ways[found.coefficient < 0.0])

@@ -16,7 +16,6 @@ from numpyro.infer.hmc import hmc
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
-from hdcal.inference.force_model.marginal import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
 
@@ -215,7 +214,7 @@ def _constrain(problem, whitening, standard, seed):
     def values(drawn):
         coordinates, key = drawn
         named = values_at(problem, whitening.position(coordinates))
-        return named | draw_members(problem, named, key)
+        return named | problem.draw_members(named, key)
 
     def chain(coordinates, key):
         # The key of a draw does not depend on the length of the run.

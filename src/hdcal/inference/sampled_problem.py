@@ -4,8 +4,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
+from jaxtyping import Float, Key
 
 from hdcal.data.priors import Prior
+from hdcal.data.records import Array
+
+# Float scalars and arrays by site name.
+Values = Mapping[str, Any]
 
 
 class Sampled(eqx.Module):
@@ -27,6 +32,14 @@ class Sampled(eqx.Module):
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
         raise NotImplementedError(type(self).__name__)
+
+    def log_likelihood(self, values: Values) -> Float[Array, ""]:
+        """Return the log likelihood of the data, members integrated out if any."""
+        raise NotImplementedError(type(self).__name__)
+
+    def draw_members(self, values: Values, key: Key[Array, ""]) -> dict[str, Any]:
+        """Draw the members that are integrated out, given the values of one draw."""
+        return {}
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the prior of each parameter given the scales of one draw."""

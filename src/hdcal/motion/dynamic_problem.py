@@ -19,14 +19,16 @@ from hdcal.data.prior import Prior, scaled
 from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site, sample_stiffness
 from hdcal.inference.force_model.padding import measured, pad_records
 from hdcal.inference.force_model.priors import influence_prior, unit_stiffness
 from hdcal.inference.force_model.problem import Problem, case_reading, without_texts
-from hdcal.inference.force_model.values import Values, where_read, with_gains
+from hdcal.inference.force_model.values import (
+    apply_gains,
+    stiffness_at_read_reference,
+)
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Sampled, Values
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.linear_response import LinearGear, linear_response
 
@@ -62,7 +64,12 @@ class DynamicProblem(Sampled):
             values[name] = sample_site(name, self.priors[name])
         for name, value in oscillation(self, values).items():
             numpyro.deterministic(name, value)
-        numpyro.factor("deformation", log_likelihood(self, values))
+        numpyro.factor("deformation", self.log_likelihood(values))
+
+    def log_likelihood(self, values: Values) -> Float[Array, ""]:
+        """Return the log likelihood of the measured rows [log 1/mm]."""
+        each = pointwise(self, values)
+        return jnp.sum(jnp.where(measured(len(each), self.count), each, 0.0))
 
 
 def dynamic_site_priors(case: Case, theory: Theory) -> dict[str, Prior]:
@@ -118,7 +125,8 @@ def oscillation(problem: DynamicProblem, values: Values) -> dict:
     These are `warm_stiffness` [N/mm], `damping` [N·s/mm] and `natural_frequency` [Hz].
     """
     stiffness = values["K"] * values["E0"] * problem.unit_stiffness
-    warm = where_read(values, stiffness) * (1.0 - values["alpha"] * problem.rise)
+    reference = stiffness_at_read_reference(values, stiffness)
+    warm = reference * (1.0 - values["alpha"] * problem.rise)
     return {
         "stiffness": stiffness,
         "warm_stiffness": warm,
@@ -140,7 +148,7 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
     derived = oscillation(problem, values)
     stiffness = derived["warm_stiffness"] * stiffness_shares(problem, values["alpha"])
     parts = values["mass"], derived["damping"], stiffness
-    gear = LinearGear(*(with_gains(values, part) for part in parts))
+    gear = LinearGear(*(apply_gains(values, part) for part in parts))
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
     rows = problem.time, problem.force, start
     return linear_response(gear, *rows)[:, 0] + values["deformation_offset"]
@@ -159,12 +167,6 @@ def pointwise(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
     sd = values["deformation_sigma"]
     error = (problem.deformation - predict_motion(problem, values)) / sd
     return -0.5 * (error**2 + jnp.log(2.0 * jnp.pi)) - jnp.log(sd)
-
-
-@log_likelihood.register
-def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
-    each = pointwise(problem, values)
-    return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 
 class DynamicPosterior(Posterior):

@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline
 
 from hdcal.errors import NotUsable
 from hdcal.inference.force_model.priors import without_scatter
-from hdcal.inference.force_model.problem import MEMBERS, case_reading
-from hdcal.inference.force_model.values import Values
+from hdcal.inference.force_model.problem import case_reading
+from hdcal.inference.force_model.values import MEMBERS, Values
 from hdcal.physics.chain import Base
 from hdcal.physics.dynamics import Forcing, Oscillator, integrate
 from hdcal.physics.effect import parameters

@@ -12,10 +12,10 @@ from hdcal.data.records import Array, Records
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.values import (
     Values,
-    acting,
     build_effects,
+    gauge_readings,
     member_base,
-    shown,
+    true_force,
 )
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
@@ -79,10 +79,10 @@ def force_of(
     if quantity == "gear":
         base = replace(base, deformation_offset=jnp.zeros_like(offset))
     effects = tuple(e for e in effects if e.stage in _STAGES[quantity])
-    at, warm = shown(values, records.deformation, records.temperature)
+    at, warm = gauge_readings(values, records.deformation, records.temperature)
     records = replace(records, deformation=at, temperature=warm)
     force, noise = predict_reading(base, effects, records, problem.reading)
-    return acting(values, force), noise
+    return true_force(values, force), noise
 
 
 @jax.jit(static_argnames=("quantity", "asked"))
@@ -143,10 +143,10 @@ def fitted_leftover(
         return jnp.zeros(len(rows.deformation))
     place = jnp.asarray(rows.deformation)
     if quantity != "reading":
-        place, _ = shown(value, place, 0.0)
+        place, _ = gauge_readings(value, place, 0.0)
     if quantity == "gear":
         place = place + value["deformation_offset"]
     ends = fitted.centre - fitted.half_range, fitted.centre + fitted.half_range
     columns = fitted.columns(jnp.clip(place, *ends), jnp.asarray(rows.sense))
     left = columns @ value["gap_weights"]
-    return left if quantity == "reading" else acting(value, left)
+    return left if quantity == "reading" else true_force(value, left)

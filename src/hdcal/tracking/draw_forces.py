@@ -14,7 +14,7 @@ from hdcal.inference.force_model.discrepancy import Discrepancy
 from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.residuals import noise_warnings
 from hdcal.inference.force_model.serial_correlation import CORRELATION
-from hdcal.inference.force_model.values import Values, as_read
+from hdcal.inference.force_model.values import Values, stiffness_as_read
 from hdcal.prediction.forces import force_of, grid_records
 from hdcal.prediction.joint import DRIFTS, JointModel, join
 from hdcal.prediction.models import Models, averaging_words, models_of
@@ -58,7 +58,9 @@ class StreamDraws:
         """Stiffness as read at the reference temperature [N/mm]."""
         problem = self.model.problem
         unit = float(problem.unit_stiffness) * problem.reading.radial_per_read
-        return as_read(self.values, self.values["K"] * self.values["E0"] * unit)
+        return stiffness_as_read(
+            self.values, self.values["K"] * self.values["E0"] * unit
+        )
 
     @property
     def variance(self) -> np.ndarray:

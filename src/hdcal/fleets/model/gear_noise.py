@@ -18,9 +18,8 @@ from jaxtyping import Float
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.fleets.model.gear_quantity import NoiseNodes, off_probability
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Sampled, Values
 
 Cells = Float[Array, "g u k"]
 # Nodes about the mode: places in standard deviations, and weights.
@@ -44,7 +43,12 @@ class GearNoise(Sampled):
     def declare(self) -> None:
         """Declare the joint density of the population and all residuals to NumPyro."""
         values = {name: sample_site(name, p) for name, p in self.priors.items()}
-        numpyro.factor("residuals", log_likelihood(self, values))
+        numpyro.factor("residuals", self.log_likelihood(values))
+
+    def log_likelihood(self, values: Values) -> Float[Array, ""]:
+        """Return the log density of all residuals, with the noise integrated out."""
+        joint, _ = noise_posterior(self, values)
+        return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
 def noise_posterior(problem: GearNoise, values: Mapping) -> tuple[Cells, Cells]:
@@ -83,12 +87,6 @@ def _mode(free, own, spread):
     # derivative is omitted. This affects the proposals slightly, not the accepted
     # density.
     return jax.lax.stop_gradient((mode, width))
-
-
-@log_likelihood.register
-def _(problem: GearNoise, values: Mapping) -> Float[Array, ""]:
-    joint, _ = noise_posterior(problem, values)
-    return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
 @jax.jit

@@ -29,9 +29,8 @@ from jaxtyping import Float, Int
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.fleets.model.groups import Grouping, group_offsets, sample_offsets
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.model import sample_site
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Sampled, Values
 
 # The local false-discovery rate up to which a gear is flagged: odds of three to one.
 MOST_FALSE = 0.25
@@ -91,7 +90,12 @@ class GearQuantity(Sampled):
             spread = values[f"{kind}_ratio"] * values["spread"]
             numpyro.deterministic(f"{kind}_sd", spread)
             values |= sample_offsets(kind, groups, spread)
-        numpyro.factor("rows", log_likelihood(self, values))
+        numpyro.factor("rows", self.log_likelihood(values))
+
+    def log_likelihood(self, values: Values) -> Float[Array, ""]:
+        """Return the log density of all rows, with the gears integrated out."""
+        joint = gear_posterior(self, values).log_joint
+        return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
 class GearPosterior(NamedTuple):
@@ -135,12 +139,6 @@ def gear_posterior(problem: GearQuantity, values: Mapping) -> GearPosterior:
     # The variance of θ alone, without the error that its rows share.
     variance = jnp.maximum(between - between * gain * precision, 0.0)
     return GearPosterior(log_joint, gain * pull, jnp.sqrt(variance))
-
-
-@log_likelihood.register
-def _(problem: GearQuantity, values: Mapping) -> Float[Array, ""]:
-    joint = gear_posterior(problem, values).log_joint
-    return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
 class DrawnGears(NamedTuple):

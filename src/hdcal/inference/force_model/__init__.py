@@ -1,1 +1,1 @@
-"""The force model as a problem of inference: noise, members, leftover."""
+"""The force model as a problem of inference: noise, members, discrepancy."""

@@ -18,7 +18,7 @@ from hdcal.data.records import Array, Records
 class CompressedRows(eqx.Module):
     """Triangular factors and numbers of rows, for each run on each specimen."""
 
-    # R of [X y]; before `whitened`, of rows that follow no other one.
+    # R of [X y]. Until `whitened` is called, only of rows without a predecessor.
     factor: Float[Array, "g r p"]
     count: Float[Array, " g"]
     run: Int[Array, " g"]
@@ -53,24 +53,24 @@ def compress(
     labels = run + (run.max() + 1) * specimen
     _, first, group = np.unique(labels, return_index=True, return_inverse=True)
     table, size = np.column_stack([columns, records.force]), len(first)
-    alone, pairs = np.full(len(table), True), None
+    first_rows, pairs = np.full(len(table), True), None
     if before is not None:
-        alone = before < 0
-        both = np.hstack([table[~alone], table[before[~alone]]])
-        pairs = _factors(both, group[~alone], size)
+        first_rows = before < 0
+        both = np.hstack([table[~first_rows], table[before[~first_rows]]])
+        pairs = _factors(both, group[~first_rows], size)
     return CompressedRows(
-        factor=_factors(table[alone], group[alone], size),
+        factor=_factors(table[first_rows], group[first_rows], size),
         count=np.bincount(group, minlength=size).astype(float),
         run=run[first],
         specimen=specimen[first],
         known_sd=float(records.force_sd[0]),
         pairs=pairs,
-        following=np.bincount(group[~alone], minlength=size).astype(float),
+        following=np.bincount(group[~first_rows], minlength=size).astype(float),
     )
 
 
 def _factors(table: np.ndarray, group: np.ndarray, size: int) -> np.ndarray:
-    """Return the triangular factor of each group's rows, zeros below few rows."""
+    """Return the triangular factor of each group, padded with rows of zeros."""
     width = table.shape[1]
     factors = np.zeros((size, width, width))
     for index in range(size):

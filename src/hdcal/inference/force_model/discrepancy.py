@@ -1,9 +1,9 @@
-"""The leftover discrepancy: a smooth function of deformation, orthogonal to the base.
+"""The discrepancy: a smooth function of deformation, orthogonal to the base model.
 
 A Gaussian process in the Hilbert-space approximation. Its basis is projected off
-an offset and a slope at the tested rows, so that it cannot take anything that
-stiffness and offsets can explain. Where loading and unloading were tested, half their
-difference is another such function, unless an effect of the model draws loops itself.
+an offset and a slope at the tested rows, so that it cannot explain what stiffness and
+offsets can. Where loading and unloading were tested, half their difference is another
+such function, unless the model contains an effect with hysteresis.
 It does not depend on temperature.
 """
 
@@ -23,7 +23,7 @@ from hdcal.physics.effect import Effect
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
 # tested deformation: enough for length-scales down to a tenth of the range.
 BASIS_SIZE = 20
-# The first of them are enough for half a loop, which is smooth between its turns.
+# Number of eigenfunctions of half a loop, which is smooth between its turns.
 _LOOP_SIZE = 8
 BOUNDARY = 2.0
 # Covariates that an effect needs whose force depends on the direction of movement.
@@ -39,8 +39,8 @@ class Discrepancy(eqx.Module):
     # Offset and slope in each function, those of half a loop last.
     absorbed: Float[Array, "2 m"]
     directed: bool = eqx.field(static=True, default=False)
-    # Factor of the half loop, 0 where an effect draws loops itself: the size does not
-    # depend on the effects, as draws of several models are joined.
+    # Factor of the half loop, 0 where the model contains an effect with hysteresis: the
+    # size does not depend on the effects, as draws of several models are joined.
     loop: float = 1.0
 
     @property
@@ -100,8 +100,8 @@ def build_discrepancy(
     scaled = (deformation - centre) / half_range
     line = np.column_stack([np.ones_like(scaled), scaled])
     absorbed = np.linalg.lstsq(line, functions[: len(line)], rcond=None)[0]
-    taken = any(effect.needs & _DIRECTION for effect in effects)
-    return replace(raw, absorbed=absorbed, loop=0.0 if taken else 1.0)
+    hysteresis = any(effect.needs & _DIRECTION for effect in effects)
+    return replace(raw, absorbed=absorbed, loop=0.0 if hysteresis else 1.0)
 
 
 def discrepancy_columns(

@@ -1,4 +1,4 @@
-"""Sensitivities of the readings: what they determine, and what the prior decides."""
+"""Sensitivities of the readings, and parameters that only the prior determines."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,8 +15,13 @@ from hdcal.inference.checks import Check, listed
 from hdcal.inference.distributions import moments
 from hdcal.inference.force_model.discrepancy import discrepancy_columns
 from hdcal.inference.force_model.padding import pad_records
-from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
-from hdcal.inference.force_model.values import predict_rows
+from hdcal.inference.force_model.problem import Problem
+from hdcal.inference.force_model.values import (
+    MEMBER_SD,
+    MEMBERS,
+    predict_rows,
+    rounding_variance,
+)
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
@@ -37,7 +42,7 @@ class Linearisation:
     # Of runs, specimens and weights of the discrepancy: the contribution of each per
     # prior sd [N], (n, m), and its value in prior sds, (m,).
     members: np.ndarray
-    place: np.ndarray
+    scores: np.ndarray
 
     def sensitivities(self) -> dict[str, np.ndarray]:
         """Return the slopes in noise sds, less what the members can explain.
@@ -49,8 +54,8 @@ class Linearisation:
         columns = (np.reshape([*self.slopes.values()], (-1, len(self.sd))) / self.sd).T
         products = np.eye(members.shape[1]) + members.T @ members
         taken = np.linalg.solve(products, members.T @ columns)
-        left = np.concatenate([columns - members @ taken, -taken])
-        return dict(zip(self.slopes, left.T, strict=True))
+        rest = np.concatenate([columns - members @ taken, -taken])
+        return dict(zip(self.slopes, rest.T, strict=True))
 
 
 def linearise(
@@ -69,7 +74,7 @@ def linearise(
     names += tuple(MEMBERS[kind] for kind in kinds)
     parts = _derivatives(problem, values, padded, columns, names=names)
     sd, slopes = jax.tree.map(lambda part: np.asarray(part)[:rows], parts)
-    members, place = [np.zeros((rows, 0))], [np.zeros(0)]
+    members, scores = [np.zeros((rows, 0))], [np.zeros(0)]
     for kind in kinds:
         site = MEMBERS[kind]
         if kind == "discrepancy" and problem.discrepancy is not None:
@@ -81,9 +86,9 @@ def linearise(
             scale, count = values[MEMBER_SD[kind]], len(values[site])
             root = scale * (np.eye(count) - 1.0 / count)
         members.append(slopes.pop(site) @ root)
-        place.append(values[site] / scale)
-    sd = np.sqrt(sd**2 + problem.step**2 / 12.0)
-    return Linearisation(sd, slopes, np.hstack(members), np.concatenate(place))
+        scores.append(values[site] / scale)
+    sd = np.sqrt(sd**2 + rounding_variance(problem.step))
+    return Linearisation(sd, slopes, np.hstack(members), np.concatenate(scores))
 
 
 @jax.jit(static_argnames=("names",))
@@ -101,7 +106,7 @@ def _derivatives(problem: Problem, values, records: Records, columns, *, names):
 def identification_checks(
     sensitivities: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> tuple[Check, ...]:
-    """Report parameters and combinations of them that the prior decides.
+    """Report parameters, and combinations of them, that only the priors determine.
 
     A direction v is flat where the data have less information than the priors:
     ‖J v‖² < ‖v/S‖² with J the sensitivities in noise sds and S the prior sds.
@@ -122,13 +127,12 @@ def identification_checks(
         if _NO_EFFECT <= length[name] < 1.0
     ]
     for names in _inseparable({n: c for n, c in scaled.items() if length[n] >= 1.0}):
-        words = "one combination of them can"
-        if set(names) == {"K", "E0"}:
-            words = "their product can, and with the prior of E0 that determines K"
-        flat.append(f"{listed(names)} cannot be distinguished by these data; {words}")
-    flat_notes = [Check(apart, "note", words) for words in flat]
-    none = Check(apart, "passed", "no direction is left to the priors")
-    return *notes, *(flat_notes or [none])
+        words = "in combination, not each of them"
+        if {*names} == {"K", "E0"}:
+            words = "as the product K·E0; K follows from it with the prior of E0"
+        flat.append(f"{listed(names)} are determined by these data only {words}")
+    none = Check(apart, "passed", "the data determine each of them")
+    return *notes, *([Check(apart, "note", words) for words in flat] or [none])
 
 
 def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
@@ -146,19 +150,19 @@ def _inseparable(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
     linked = np.zeros((len(names), len(names)))
     for pair in combinations(range(len(names)), 2):
         linked[pair] = np.linalg.svd(few[:, [*pair]], compute_uv=False)[-1] < 1.0
-    count, group = connected_components(linked, directed=False)
+    count, label = connected_components(linked, directed=False)
     groups = (
-        [n for n, g in zip(names, group, strict=True) if g == i] for i in range(count)
+        [n for n, g in zip(names, label, strict=True) if g == i] for i in range(count)
     )
-    found = [members for members in groups if len(members) > 1]
+    found = [group for group in groups if len(group) > 1]
     # A row for each column, also with fewer readings than columns.
     padded = np.vstack([few, np.zeros((len(names), len(names)))])
-    _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
-    named = sum(len(members) - 1 for members in found)
-    further = max(int(np.sum(strength < 1.0)) - named, 0)
+    _, singular_values, vectors = np.linalg.svd(padded, full_matrices=False)
+    named = sum(len(group) - 1 for group in found)
+    further = max(int(np.sum(singular_values < 1.0)) - named, 0)
     for vector in vectors[::-1][:further]:
         share = np.abs(vector) / np.abs(vector).max()
-        members = [n for n, part in zip(names, share, strict=True) if part >= _SHARE]
-        if len(members) > 2 and members not in found:
-            found.append(members)
+        large = [n for n, part in zip(names, share, strict=True) if part >= _SHARE]
+        if len(large) > 2 and large not in found:
+            found.append(large)
     return found

@@ -1,6 +1,7 @@
 """Likelihood of the readings of a problem."""
 
-from functools import partial, singledispatch
+from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -11,13 +12,13 @@ from jaxtyping import Float
 from scipy import special
 
 from hdcal.data.records import Array, Records
-from hdcal.inference.force_model.marginal import linear_part
-from hdcal.inference.force_model.padding import measured
-from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
-from hdcal.inference.force_model.values import Values, predict_rows, with_rounding
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.force_model.values import predict_rows, with_rounding
+from hdcal.inference.sampled_problem import Sampled, Values
 from hdcal.physics.effect import Noise
+
+if TYPE_CHECKING:
+    from hdcal.inference.force_model.problem import Problem
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the
 # series is off by 4e-9 at most.
@@ -67,7 +68,7 @@ def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]
 
 
 def pointwise_log_likelihood(
-    problem: Problem, values: Values, records: Records, columns, before
+    problem: "Problem", values: Values, records: Records, columns, before
 ) -> Float[Array, " n"]:
     """Return the log likelihood of each row given all values [log 1/N].
 
@@ -85,23 +86,12 @@ def pointwise_log_likelihood(
     )
 
 
-@singledispatch
-def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
-    """Return the log likelihood of the measured rows, members integrated out if any."""
-    raise NotImplementedError(type(problem).__name__)
-
-
-@log_likelihood.register
-def _(problem: Problem, values: Values) -> Float[Array, ""]:
-    if problem.integrated or problem.blocks is not None:
-        return linear_part(problem, values).log_likelihood()
-    rows = problem.rows, problem.columns, problem.before
-    each = pointwise_log_likelihood(problem, values, *rows)
-    return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
-
-
 @jax.jit
 def log_likelihoods(problem: Sampled, draws: Values) -> Float[Array, "chain draw"]:
     """Return the log likelihood of all data by draw."""
+
+    def of_draw(values):
+        return problem.log_likelihood(values)
+
     # One draw after the other: all rows of thousands of draws would fill the memory.
-    return jax.vmap(partial(jax.lax.map, partial(log_likelihood, problem)))(draws)
+    return jax.vmap(partial(jax.lax.map, of_draw))(draws)

@@ -8,7 +8,7 @@ r = Z w + e with standard normal scores w. With A = I + Z'Z and u = Z'r:
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -19,20 +19,24 @@ from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 from hdcal.inference.force_model.padding import measured
-from hdcal.inference.force_model.problem import MEMBER_SD, MEMBERS, Problem
 from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
     log_volume,
     whiten,
 )
 from hdcal.inference.force_model.values import (
-    Values,
+    MEMBER_SD,
+    MEMBERS,
     member_base,
     predict_rows,
+    rounding_variance,
     with_rounding,
 )
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Values
 from hdcal.physics.chain import linear_coefficients
+
+if TYPE_CHECKING:
+    from hdcal.inference.force_model.problem import Problem
 
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
@@ -61,10 +65,10 @@ class Linear(eqx.Module):
         factor, mean = self._solved()
         # A sum of squares: the difference r'r − u'A⁻¹u would lose its digits where
         # members spread much wider than the noise.
-        left = self.residual - self.design @ mean
-        square = left @ left + mean @ mean
-        volume = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
-        return -0.5 * (square + volume) - self.log_scale
+        rest = self.residual - self.design @ mean
+        square = rest @ rest + mean @ mean
+        log_det = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
+        return -0.5 * (square + log_det) - self.log_scale
 
     def draw(self, key: Key[Array, ""]) -> Float[Array, " m"]:
         """Draw the scores from their distribution given y."""
@@ -81,11 +85,11 @@ class _Rows(NamedTuple):
 
     residual: Float[Array, " r"]
     columns: dict[str, tuple[Float[Array, " r"], Int[Array, " r"]]]
-    gap: Float[Array, "r m"] | None
+    discrepancy: Float[Array, "r m"] | None
     log_scale: Float[Array, ""]
 
 
-def linear_part(problem: Problem, values: Values) -> Linear:
+def linear_part(problem: "Problem", values: Values) -> Linear:
     """Return the residual that the integrated members have to explain.
 
     Values of integrated members, if there are any, are left out.
@@ -98,21 +102,22 @@ def linear_part(problem: Problem, values: Values) -> Linear:
     for kind in problem.integrated:
         root = _root(problem, values, kind)
         if kind == "discrepancy":
-            assert rows.gap is not None
-            design.append(rows.gap @ root)
+            assert rows.discrepancy is not None
+            design.append(rows.discrepancy @ root)
         else:
             column, label = rows.columns[kind]
             design.append(column[:, None] * root[label])
     return Linear(rows.residual, jnp.hstack(design), rows.log_scale)
 
 
-def _root(problem: Problem, values: Values, kind: str) -> Float[Array, "members m"]:
+def _root(problem: "Problem", values: Values, kind: str) -> Float[Array, "members m"]:
     """Return a root of the prior covariance of the members of a kind.
 
     Runs and specimens are deviations from the mean of the tested ones.
     """
     if kind != "discrepancy":
-        return values[MEMBER_SD[kind]] * contrasts(getattr(problem, f"{kind}s"))
+        count = {"run": problem.runs, "specimen": problem.specimens}[kind]
+        return values[MEMBER_SD[kind]] * contrasts(count)
     assert problem.discrepancy is not None
     sd = problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
     return jnp.diag(sd)
@@ -123,7 +128,7 @@ def contrasts(count: int) -> Float[Array, "count k"]:
     return jnp.asarray(helmert(count).T)
 
 
-def _measured_rows(problem: Problem, values: Values) -> _Rows:
+def _measured_rows(problem: "Problem", values: Values) -> _Rows:
     records, before = problem.rows, problem.before
     mean, noise = predict_rows(problem, values, records, None)
     sd = with_rounding(noise, problem.step).sd[0]
@@ -136,21 +141,21 @@ def _measured_rows(problem: Problem, values: Values) -> _Rows:
         scaled = (jnp.where(real, 1.0 / sd, 0.0) * column.T).T
         return scaled if before is None else whiten(scaled, before, correlation)
 
-    volume = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
+    log_scale = jnp.sum(jnp.where(real, jnp.log(sd) + _HALF_LOG_2PI, 0.0))
     return _Rows(
         white(records.force - mean),
         {"run": (white(jnp.ones_like(sd)), jnp.asarray(records.run))},
         None if problem.columns is None else white(problem.columns),
-        volume + log_volume(following, correlation),
+        log_scale + log_volume(following, correlation),
     )
 
 
-def _compressed_rows(problem: Problem, values: Values) -> _Rows:
+def _compressed_rows(problem: "Problem", values: Values) -> _Rows:
     assert problem.blocks is not None
     correlation = values.get(CORRELATION, 0.0)
     blocks = problem.blocks.whitened(correlation)
     # Sheppard's correction, which is exact to 2 exp(−2π²σ²/step²).
-    square = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    square = values["sigma"] ** 2 + blocks.known_sd**2 + rounding_variance(problem.step)
     sd = jnp.sqrt(square)
     factor = blocks.factor / sd
     slope = linear_coefficients(
@@ -161,7 +166,7 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
     )
     core = jnp.broadcast_to(core, (len(blocks.count), CORE))
     fitted = jnp.einsum("gij,gj->gi", factor[..., :CORE], core)
-    volume = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
+    log_scale = jnp.sum(blocks.count) * (jnp.log(sd) + _HALF_LOG_2PI)
     columns = {
         "run": (factor[..., ONE], blocks.run),
         "specimen": (factor[..., :CORE] @ slope, blocks.specimen),
@@ -171,14 +176,12 @@ def _compressed_rows(problem: Problem, values: Values) -> _Rows:
         (factor[..., -1] - fitted).reshape(-1),
         {n: (c.reshape(-1), jnp.repeat(of, size)) for n, (c, of) in columns.items()},
         factor[..., CORE:-1].reshape(fitted.size, -1),
-        volume + log_volume(jnp.sum(blocks.following), correlation),
+        log_scale + log_volume(jnp.sum(blocks.following), correlation),
     )
 
 
-def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
-    """Draw the integrated members, if any, given the shared parameters of one draw."""
-    if not isinstance(problem, Problem) or not problem.integrated:
-        return {}
+def draw_members(problem: "Problem", values: Values, key: Key[Array, ""]) -> dict:
+    """Draw the integrated members given the shared parameters of one draw."""
     scores, drawn = linear_part(problem, values).draw(key), {}
     for kind in problem.integrated:
         root = _root(problem, values, kind)

@@ -5,6 +5,7 @@ of them the stated prior is exact.
 """
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpyro
@@ -14,13 +15,14 @@ from jax.nn import log_sigmoid, softplus
 from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
-from hdcal.inference.force_model.likelihood import log_likelihood
 from hdcal.inference.force_model.padding import measured
-from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.serial_correlation import CORRELATION
-from hdcal.inference.force_model.values import stiffness, with_gains
+from hdcal.inference.force_model.values import apply_gains, rounding_variance, stiffness
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
+
+if TYPE_CHECKING:
+    from hdcal.inference.force_model.problem import Problem
 
 CONTACT = "deformation_offset"
 SLACK = "seating_slack.clearance"
@@ -28,7 +30,7 @@ SLACK = "seating_slack.clearance"
 _AMPLITUDE = 0.1
 
 
-def declare(problem: Problem) -> None:
+def declare(problem: "Problem") -> None:
     """Declare the joint density of parameters and data of the force model."""
     priors, values = problem.priors, sample_stiffness(problem.priors)
     values["alpha"] = sample_site("alpha", priors["alpha"])
@@ -39,7 +41,7 @@ def declare(problem: Problem) -> None:
     if problem.runs:
         values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
     zero = problem.priors_given(values)[name]
-    values[name] = sample_moved(name, zero, "_centre_force", shift=there)
+    values[name] = sample_affine(name, zero, "_centre_force", shift=there)
     with_slack = SLACK in priors
     if not with_slack:
         values[CONTACT] = sample_site(CONTACT, priors[CONTACT])
@@ -51,7 +53,7 @@ def declare(problem: Problem) -> None:
         values[CONTACT] = _sample_contact(problem, values)
     _sample_members(problem, values)
     numpyro.deterministic("stiffness", stiffness(problem, values))
-    numpyro.factor("force", log_likelihood(problem, values))
+    numpyro.factor("force", problem.log_likelihood(values))
 
 
 def sample_site(name: str, prior: Prior):
@@ -61,7 +63,7 @@ def sample_site(name: str, prior: Prior):
     return numpyro.sample(name, distribution(prior, name))
 
 
-def sample_moved(
+def sample_affine(
     name: str,
     prior: Prior,
     coordinate: str,
@@ -71,16 +73,11 @@ def sample_moved(
     """Sample scale · parameter + shift as a coordinate, and return the parameter."""
     if prior.family == "fixed":
         return sample_site(name, prior)
-    moved = numpyro.sample(coordinate, _scaled_and_moved(name, prior, scale, shift))
-    return numpyro.deterministic(name, (moved - shift) / scale)
-
-
-def _scaled_and_moved(name: str, prior: Prior, scale, shift) -> dist.Distribution:
-    """Return the distribution of scale · parameter + shift."""
     base = distribution(prior, name)
     domain = base.support or dist.constraints.real
     transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
-    return dist.TransformedDistribution(base, transform)
+    affine = numpyro.sample(coordinate, dist.TransformedDistribution(base, transform))
+    return numpyro.deterministic(name, (affine - shift) / scale)
 
 
 def sample_amplitude(name: str, prior: Prior, over: Scalar = 1.0):
@@ -107,12 +104,12 @@ def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
     """
     names = ["E0", *(name for name in GAUGE_UNITS if name in priors)]
     values = {name: sample_site(name, priors[name]) for name in names}
-    modulus = with_gains(values, values["E0"])
-    values["K"] = sample_moved("K", priors["K"], "_KE0", modulus)
+    modulus = apply_gains(values, values["E0"])
+    values["K"] = sample_affine("K", priors["K"], "_KE0", modulus)
     return values
 
 
-def _sample_contact(problem: Problem, values: Mapping):
+def _sample_contact(problem: "Problem", values: Mapping):
     """Sample the point of first contact ω₀ with slack c, by where slack is taken up.
 
     Rows of a gear that is pressed determine ω₀ + c well, and neither ω₀ nor c. Rows of
@@ -121,30 +118,30 @@ def _sample_contact(problem: Problem, values: Mapping):
     way = jnp.sign(problem.rows.deformation)
     pressed = jnp.mean(way, where=measured(len(way), problem.count))
     taken_up = pressed * values[SLACK] / problem.reading.radial_per_read
-    return sample_moved(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)
+    return sample_affine(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)
 
 
-def _sample_noise(problem: Problem, values: dict) -> None:
+def _sample_noise(problem: "Problem", values: dict) -> None:
     """Sample the noise: its sd, the correlation of neighbours, and its effects.
 
-    Where neighbours are highly correlated rows determine what each adds to the one
-    before, σ √(1 − ρ²), and neither σ nor ρ: that is the coordinate. The unit of the
-    part that grows with the force is divided by √(1 − ρ²).
+    Where neighbours are highly correlated, rows determine the sd of the innovations,
+    σ √(1 − ρ²), but neither σ nor ρ: that sd is the coordinate. The unit of the part
+    that grows with the force is divided by √(1 − ρ²).
     """
-    prior, added = problem.priors["sigma"], 1.0
+    prior, factor = problem.priors["sigma"], 1.0
     if problem.correlated:
         values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
-        added = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
-        values["sigma"] = sample_moved("sigma", prior, "_added_sd", added)
+        factor = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
+        values["sigma"] = sample_affine("sigma", prior, "_added_sd", factor)
     else:
         values["sigma"] = sample_site("sigma", prior)
     for effect in problem.effects:
         if effect.stage == "noise":
-            _sample_effect(problem, effect, values, added)
+            _sample_effect(problem, effect, values, factor)
 
 
 def _sample_effect(
-    problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
+    problem: "Problem", effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
     """Sample the parameters of an effect; `over` divides the unit of amplitudes."""
     for field in parameters(effect):
@@ -156,7 +153,7 @@ def _sample_effect(
             values[name] = sample_site(name, prior)
 
 
-def _sample_members(problem: Problem, values: dict) -> None:
+def _sample_members(problem: "Problem", values: dict) -> None:
     """Sample scales of specimens and discrepancy, and members if not integrated.
 
     Runs and specimens are deviations from the mean of the tested ones.
@@ -176,9 +173,11 @@ def _sample_members(problem: Problem, values: dict) -> None:
         values["specimen_deviation"] = _sample_deviations(
             "specimen_deviation", values["specimen_sd"], known, problem.specimens
         )
-    if (gap := problem.discrepancy) is not None and "discrepancy" not in integrated:
-        score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
-        scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
+    discrepancy = problem.discrepancy
+    if discrepancy is not None and "discrepancy" not in integrated:
+        normal = dist.Normal(0.0, 1.0).expand([discrepancy.size])
+        score = numpyro.sample("_gap", normal)
+        scale = discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
         values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 
@@ -195,14 +194,14 @@ def _sample_deviations(name: str, sd, known_sd, count: int):
     return numpyro.deterministic(name, sd / spread * score)
 
 
-def _mean_sd(problem: Problem, values: Mapping, members: int):
+def _mean_sd(problem: "Problem", values: Mapping, members: int):
     """Return about how well the mean reading of a member is known [N]."""
     known = _mean_square(problem, problem.rows.force_sd)
-    variance = values["sigma"] ** 2 + known + problem.step**2 / 12.0
+    variance = values["sigma"] ** 2 + known + rounding_variance(problem.step)
     return jnp.sqrt(variance * members / problem.count)
 
 
-def _mean_square(problem: Problem, column):
+def _mean_square(problem: "Problem", column):
     """Return the mean square of a column over the measured rows."""
     real = measured(len(column), problem.count)
     return jnp.sum(jnp.where(real, column**2, 0.0)) / problem.count

@@ -1,10 +1,11 @@
-"""A fit by least squares, and whether its noise grows with the deformation."""
+"""Fit of lines by least squares, and a test whether its noise grows."""
 
 from typing import NamedTuple
 
 import numpy as np
 from jax import jit
 from jaxtyping import Float
+from scipy.linalg import orth
 from scipy.special import ndtr
 
 from hdcal.data.case import Case
@@ -14,23 +15,23 @@ from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.serial_correlation import previous_rows, whiten
 from hdcal.physics.history import stop_cells
 
-# Fewer rows do not show how their noise depends on anything.
+# Smallest number of rows for a test of the noise.
 _LEAST_ROWS = 12
-# Noise sds over a range that differ by less count as one.
+# Smallest ratio of the noise sds at the ends of the range that counts as growth.
 _LEAST_GROWTH = 1.1
-# Correlation of neighbours that is taken off residuals, at most.
+# Largest correlation of neighbours that is removed from residuals.
 _LARGEST_CORRELATION = 0.95
 # Shares of the range after which the cells of a loop slip.
 _REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
-# Probability that growth is found in noise of one size.
+# Significance level of the test for noise that grows.
 _FALSE_ALARM = 0.05
 # Of more specimens or runs the lines or means are subtracted first.
 _MOST_COLUMNS = 50
 _stop_cells = jit(stop_cells)
 
 
-class BaseForces(NamedTuple):
-    """A linear model of the force, fitted by least squares."""
+class LineFit(NamedTuple):
+    """Lines of specimens with zeros of runs, fitted to the force by least squares."""
 
     # Orthonormal, (n, p).
     columns: np.ndarray
@@ -40,7 +41,7 @@ class BaseForces(NamedTuple):
 
     @property
     def residual(self) -> np.ndarray:
-        """What the columns leave of the force [N]."""
+        """Residual force [N]."""
         return self.force - self.columns @ (self.columns.T @ self.force)
 
     @property
@@ -51,8 +52,8 @@ class BaseForces(NamedTuple):
         return float(np.sqrt(residual @ residual / free))
 
 
-def base_model(records: Records, shapes: str = "line") -> BaseForces:
-    """Return the model of a line for each specimen with a zero for each run.
+def fit_lines(records: Records, shapes: str = "line") -> LineFit:
+    """Fit a line to each specimen with a zero for each run.
 
     `shapes` is `line`; `bend` also has a cubic, a step for the direction and a drift
     with the temperature, which stand for effects; `loop` in addition a loop of any
@@ -63,7 +64,7 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
         np.asarray(values, float) for values in (records.force, records.deformation)
     )
     scaled = deformation / (np.max(np.abs(deformation)) or 1.0)
-    place = (deformation - deformation.mean()) / (np.ptp(deformation) or 1.0)
+    centred = (deformation - deformation.mean()) / (np.ptp(deformation) or 1.0)
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
     sense = np.asarray(records.sense, float)
     specimens, runs = np.unique(specimen), np.unique(run)
@@ -72,7 +73,7 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
         # The modulus falls with the temperature; a drift of the zero is no part of it.
         columns += [rise * deformation]
     if shapes != "line":
-        columns += [place**2, place**3, sense, rise]
+        columns += [centred**2, centred**3, sense, rise]
     if shapes == "loop":
         loop = [sense * np.abs(scaled), sense * scaled**2]
         columns += [*loop, *loop_cells(records, _REACHES)]
@@ -88,15 +89,13 @@ def base_model(records: Records, shapes: str = "line") -> BaseForces:
         else:
             columns += [(run == i).astype(float) for i in runs]
     table = np.reshape(columns, (-1, len(force))).T
-    left, strength, _ = np.linalg.svd(table, full_matrices=False)
-    kept = left[:, strength > 1e-10 * strength.max(initial=0.0)]
-    return BaseForces(kept, force, taken)
+    return LineFit(orth(table, rcond=1e-10), force, taken)
 
 
-def pilot_fit(records: Records) -> BaseForces:
-    """Return a generous fit, for the size of the noise before any sampling."""
+def pilot_fit(records: Records) -> LineFit:
+    """Return a flexible fit, for the size of the noise before any sampling."""
     # Too small a noise only chooses the exact likelihood of rounded readings.
-    return base_model(records, "bend")
+    return fit_lines(records, "bend")
 
 
 def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:
@@ -115,7 +114,7 @@ def noise_grows(case: Case) -> bool:
 
     By more than a tenth over the range, which noise in proportion to the deformation
     can do there, with no sd of each row stated and no step of the reading wider than
-    the noise. What a loop leaves at its turns is no noise.
+    the noise. Residuals at the turns of a loop do not count.
     """
     records, pilot = case.records, pilot_fit(case.records)
     coarse = case.gear.force_resolution > pilot.noise_sd
@@ -125,8 +124,8 @@ def noise_grows(case: Case) -> bool:
     if far.max() < _LEAST_GROWTH * far.min():
         return False
     if "unloading" in records.known:
-        pilot = base_model(records, "loop")
-    square = _added(pilot.residual, previous_rows(records)) ** 2
+        pilot = fit_lines(records, "loop")
+    square = _innovations(pilot.residual, previous_rows(records)) ** 2
     if growth_p_value(square, far) >= _FALSE_ALARM:
         return False
     slope, start = np.polyfit(far, square, 1)
@@ -134,10 +133,10 @@ def noise_grows(case: Case) -> bool:
     return bool(most > _LEAST_GROWTH**2 * least)
 
 
-def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return what each row adds to the row before it, on one scale.
+def _innovations(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return the innovation of each row, of the same sd in all rows.
 
-    Squares of correlated errors come in waves, which pass for growth too often.
+    Squares of correlated errors are correlated too, which raises false positives.
     """
     follows, square = before >= 0, float(residual @ residual)
     if not follows.any() or not square > 0.0:
@@ -148,12 +147,13 @@ def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 def growth_p_value(square, deformation) -> float:
-    """Return how rarely squared errors of one size grow so much with deformation.
+    """Return the p value of Koenker's test for an error variance that grows.
 
-    The test is that of Koenker, Journal of Econometrics 17 (1981).
+    Errors of constant variance grow so much with the deformation with this probability
+    (Koenker, Journal of Econometrics 17, 1981).
     """
     far = np.abs(np.asarray(deformation))
-    off, left = far - far.mean(), square - square.mean()
-    scale = np.sqrt((off @ off) * (left @ left))
-    correlation = float(off @ left) / scale if scale > 0.0 else 0.0
+    x, y = far - far.mean(), square - square.mean()
+    scale = np.sqrt((x @ x) * (y @ y))
+    correlation = float(x @ y) / scale if scale > 0.0 else 0.0
     return float(ndtr(-np.sqrt(len(far)) * correlation))

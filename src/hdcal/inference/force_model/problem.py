@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import jit
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Key
 
 from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import is_stated
@@ -21,7 +21,10 @@ from hdcal.inference.force_model.discrepancy import (
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.force_model.padding import pad_records
+from hdcal.inference.force_model.likelihood import pointwise_log_likelihood
+from hdcal.inference.force_model.marginal import draw_members, linear_part
+from hdcal.inference.force_model.model import declare
+from hdcal.inference.force_model.padding import measured, pad_records
 from hdcal.inference.force_model.priors import (
     problem_priors,
     unit_stiffness,
@@ -29,18 +32,10 @@ from hdcal.inference.force_model.priors import (
 )
 from hdcal.inference.force_model.serial_correlation import previous_rows
 from hdcal.inference.force_model.structure import ModelStructure, decide_structure
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Sampled, Values
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect
 
-# Parameters that come in numbers: the site of each kind, and the site of the spread of
-# those that are labels in the data.
-MEMBERS = {
-    "run": "run_offset",
-    "specimen": "specimen_deviation",
-    "discrepancy": "gap_weights",
-}
-MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # The cost of a density grows with the cube of the number of runs or specimens.
 _MOST_MEMBERS = 200
 _base_columns = jit(linear_columns)
@@ -111,10 +106,19 @@ class Problem(Sampled):
 
     def declare(self) -> None:
         """Declare the joint density."""
-        # Late: it imports this module.
-        from hdcal.inference.force_model.model import declare
-
         declare(self)
+
+    def log_likelihood(self, values: Values) -> Float[Array, ""]:
+        """Return the log likelihood of the measured rows [log 1/N]."""
+        if self.integrated or self.blocks is not None:
+            return linear_part(self, values).log_likelihood()
+        rows = self.rows, self.columns, self.before
+        each = pointwise_log_likelihood(self, values, *rows)
+        return jnp.sum(jnp.where(measured(len(each), self.count), each, 0.0))
+
+    def draw_members(self, values: Values, key: Key[Array, ""]) -> dict[str, Any]:
+        """Draw the members that are integrated out, given the values of one draw."""
+        return draw_members(self, values, key) if self.integrated else {}
 
     @property
     def rows(self) -> Records:
@@ -124,7 +128,10 @@ class Problem(Sampled):
 
 
 def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return priors without unit and source, for which JAX would compile anew."""
+    """Return priors without unit and source.
+
+    Strings are static parts of a pytree: other ones would be compiled again.
+    """
     return {
         name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
         for name, prior in priors.items()
@@ -145,19 +152,16 @@ def build_problem(
     `InputError` if an effect lacks its covariates or a prior.
     """
     records, reading = case.records, case_reading(case)
-    members = {
-        kind: len(getattr(case, f"{kind}_labels"))
-        for kind in MEMBER_SD
-        if kind in records.known
-    }
+    labels = {"run": case.run_labels, "specimen": case.specimen_labels}
+    members = {k: len(names) for k, names in labels.items() if k in records.known}
     _check(case, effects, members)
     effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     form = structure or decide_structure(case, effects)
-    leftover = build_discrepancy(records, effects) if form.with_gap else None
+    discrepancy = build_discrepancy(records, effects) if form.with_gap else None
     before = previous_rows(records) if form.correlated else None
     compressed = not (form.rounded or effects)
-    kept = _kept_rows(records, reading, leftover, before, compressed=compressed)
+    kept = _kept_rows(records, reading, discrepancy, before, compressed=compressed)
     integrated = []
     if not (form.rounded or any(effect.mixture for effect in effects)):
         # Through an effect the force need not be linear in the stiffness.
@@ -171,7 +175,7 @@ def build_problem(
         reading=reading,
         **kept,
         count=len(records.force),
-        discrepancy=leftover,
+        discrepancy=discrepancy,
         step=case.gear.force_resolution,
         effects=effects,
         rounded=form.rounded,
@@ -188,14 +192,14 @@ def build_problem(
 def _kept_rows(
     records: Records,
     reading: Reading,
-    leftover: Discrepancy | None,
+    discrepancy: Discrepancy | None,
     before: np.ndarray | None,
     *,
     compressed: bool,
 ) -> dict[str, Any]:
     """Return the fields of a problem that hold rows, compressed if they can be."""
     padded, rows = pad_records(records), len(records.force)
-    columns = discrepancy_columns(leftover, padded)
+    columns = discrepancy_columns(discrepancy, padded)
     if compressed:
         base = np.asarray(_base_columns(padded, reading))[:rows]
         design = base if columns is None else np.hstack([base, columns[:rows]])

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import special
+from scipy.linalg import orth
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
@@ -22,8 +23,8 @@ Shapes = dict[str, tuple[np.ndarray, str, str]]
 
 
 @dataclass(frozen=True)
-class Structure:
-    """One shape that noise would rarely have, with a p value for all shapes tried."""
+class ResidualFinding:
+    """A shape or a fault of the noise, with a p value for all tests made."""
 
     name: str
     p_value: float
@@ -118,7 +119,7 @@ def shapes_of(
 
 def find_structure(
     data: Whitened, sd: np.ndarray, noise: Correlated | None = None, *, looks: int = 1
-) -> tuple[Structure, ...]:
+) -> tuple[ResidualFinding, ...]:
     """Find the shapes that residuals have beyond what the model can absorb.
 
     The clearest shape is taken first; the others are then tested on what it leaves,
@@ -127,7 +128,7 @@ def find_structure(
     The noise sd of each row is in N.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed
-    structures: list[Structure] = []
+    findings: list[ResidualFinding] = []
     while shapes:
         columns = {name: column for name, (column, _, _) in shapes.items()}
         tests = _tests(data.residual, columns, orthonormal(absorbed), noise)
@@ -142,24 +143,24 @@ def find_structure(
         rms = float(np.sqrt(np.mean(shape**2)))
         way = up if best.coefficient > 0.0 else down
         words = f"The residuals {way} ({rms:.2g} {{N}} rms)."
-        structures.append(Structure(best.name, p, rms, words, *best.size(column)))
+        size = best.size(column)
+        findings.append(ResidualFinding(best.name, p, rms, words, *size))
         absorbed = np.column_stack([absorbed, column])
-    for place, shape in enumerate(structures if len(structures) > 1 else ()):
-        others = [data.shapes[s.name][0] for s in structures if s is not shape]
+    for index, shape in enumerate(findings if len(findings) > 1 else ()):
+        others = [data.shapes[s.name][0] for s in findings if s is not shape]
         basis = orthonormal(np.column_stack([data.absorbed, *others]))
         column = data.shapes[shape.name][0]
         for test in _tests(data.residual, {shape.name: column}, basis, noise):
             size, error = test.size(column)
-            structures[place] = replace(shape, coefficient=size, error=error)
-    return tuple(structures)
+            findings[index] = replace(shape, coefficient=size, error=error)
+    return tuple(findings)
 
 
 def orthonormal(absorbed: np.ndarray) -> np.ndarray:
     """Return orthonormal columns that span those that are absorbed, (n, q)."""
     scale = np.linalg.norm(absorbed, axis=0)
     columns = absorbed[:, scale > 0.0] / scale[scale > 0.0]
-    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
-    return left[:, strength > 1e-8 * strength[0]]
+    return orth(columns, rcond=1e-8)
 
 
 def _tests(
@@ -171,7 +172,7 @@ def _tests(
     """Test each column that the model does not absorb, by generalised least squares.
 
     Where neighbours may be correlated the p value given ρ is averaged over the
-    posterior of ρ with that column in the model: a bend alone passes for correlation.
+    posterior of ρ with that column in the model: a bend alone resembles correlation.
     There are no tests where too few rows are left.
     """
     size, free = basis.shape[1], len(residual) - basis.shape[1] - 1
@@ -183,8 +184,8 @@ def _tests(
             units[name] = rest / length
     if free < 1 or not units:
         return []
-    left = residual - basis @ (basis.T @ residual)
-    table = np.column_stack([basis, *units.values(), left])
+    error = residual - basis @ (basis.T @ residual)
+    table = np.column_stack([basis, *units.values(), error])
     before, rho = np.full(len(residual), -1), np.zeros(1)
     if noise is not None:
         rho = np.minimum(quantiles(noise.prior, _CORRELATIONS), _CLOSEST)
@@ -196,13 +197,13 @@ def _tests(
     tests = []
     for index, (name, unit) in enumerate(units.items()):
         square, cross = rest[:, index, index], rest[:, index, -1]
-        error = np.maximum(rest[:, -1, -1] - cross**2 / square, _TINY)
-        log_chance = log_weight - 0.5 * (np.log(square) + free * np.log(error))
-        chance = special.softmax(log_chance)
-        sd = np.sqrt(error / (free * square))
+        remaining = np.maximum(rest[:, -1, -1] - cross**2 / square, _TINY)
+        log_det = np.log(square) + free * np.log(remaining)
+        probability = special.softmax(log_weight - 0.5 * log_det)
+        sd = np.sqrt(remaining / (free * square))
         t = np.abs(cross) / (square * sd)
         p, coefficient, sd = (
-            float(chance @ given_rho)
+            float(probability @ given_rho)
             for given_rho in (2.0 * special.stdtr(free, -t), cross / square, sd)
         )
         tests.append(_Test(name, p, coefficient, sd, unit))

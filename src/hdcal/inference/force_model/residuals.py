@@ -1,4 +1,4 @@
-"""What the calibrated model leaves over: its shapes, and whether the rest is noise."""
+"""Residuals of a calibration: systematic shapes, and tests of the noise."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.residual_shapes import (
     FALSE_ALARM,
     Correlated,
-    Structure,
+    ResidualFinding,
     Whitened,
     find_structure,
     orthonormal,
@@ -39,13 +39,13 @@ NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 # Draws that the fitted reading is averaged over: its error is then a tenth of that of
 # the posterior.
 _DRAWS = 200
-# Fewer rows do not show the properties of their noise.
+# Smallest number of rows for tests of the noise.
 _LEAST_ROWS = 12
 # Efficiency of the median of absolute errors.
 _EFFICIENCY = 0.37
-# A wild reading lies so many sds off and has so large a share of all squares, and few
-# readings are wild: jumps of a rig are many, and noise may have long tails.
-_WILD, _SHARE, _FEW = 12.0, 0.02, 3
+# An outlier deviates by at least so many sds and has at least this share of the sum of
+# squares. More than so many are not reported: they are jumps of a rig or long tails.
+_OUTLIER, _SHARE, _MAX_OUTLIERS = 12.0, 0.02, 3
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Residuals:
     # In N, and in sds of the noise.
     residual: np.ndarray
     standardised: np.ndarray
-    # Shapes that noise would rarely show, and how the rest differs from the model's.
-    structure: tuple[Structure, ...]
-    noise: tuple[Structure, ...]
+    # Shapes that noise would rarely show, and differences from the noise of the model.
+    structure: tuple[ResidualFinding, ...]
+    noise: tuple[ResidualFinding, ...]
     units: Quantities
 
 
@@ -113,18 +113,18 @@ def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
     """Return residuals, sensitivities and shapes in noise and prior sds."""
     case, centre = posterior.case, posterior.median
     sd, priors = near.sd, posterior.effective_priors
-    columns, pull = [near.members], [*-near.place]
+    columns, prior_residual = [near.members], [*-near.scores]
     for name, slope in near.slopes.items():
         mean, prior_sd = moments(priors[name], name)
         columns.append(slope[:, None] * prior_sd)
-        pull.append((mean - centre[name]) / prior_sd)
+        prior_residual.append((mean - centre[name]) / prior_sd)
     smoothed = case.screening is not None and case.screening.deformation_sd > 0.0
     reference = case.gear.reference_temperature
     shapes = shapes_of(case.records, reference, smoothed=smoothed)
-    none = np.zeros(len(pull))
+    none = np.zeros(len(prior_residual))
     return Whitened(
-        residual=np.concatenate([residual / sd, pull]),
-        absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(pull))]),
+        residual=np.concatenate([residual / sd, prior_residual]),
+        absorbed=np.vstack([np.hstack(columns) / sd[:, None], np.eye(len(none))]),
         shapes={
             name: (np.concatenate([column / sd, none]), up, down)
             for name, (column, up, down) in shapes.items()
@@ -149,34 +149,34 @@ def noise_faults(
     rounded: bool,
     mixed: bool = False,
     correlation: float = 0.0,
-) -> tuple[Structure, ...]:
-    """Return how residuals differ from the noise that the model has.
+) -> tuple[ResidualFinding, ...]:
+    """Test whether residuals differ from the noise of the model.
 
     The family-wise error of the tests is `FALSE_ALARM`. `data` absorbs the shapes that
     were found; the noise sd of each row is in N. Where steps of the reading are wider
     than its noise (`rounded`), neighbours err in the same way without any correlation;
-    a model that is `mixed` expects wild readings.
+    a model that is `mixed` expects outliers.
     """
     if len(sd) < _LEAST_ROWS:
         return ()
     before = previous_rows(records)
-    # Squares of correlated errors come in waves, which pass for growth.
+    # Squares of correlated errors are correlated too, which raises false positives.
     left = _independent(data, before, correlation)
     rms = float(np.sqrt(np.mean((left.scaled * sd) ** 2)))
     words = "Readings scatter more at larger {load}s: bounds there are too low."
     p_value = growth_p_value(left.scaled**2, records.deformation)
-    tests = [Structure(SCATTER, p_value, rms, words)]
+    tests = [ResidualFinding(SCATTER, p_value, rms, words)]
     if not (rounded or mixed):
-        added = sd * np.sqrt(1.0 - correlation**2 * (before >= 0))
-        tests.append(_wild(left, records, added))
+        innovation_sd = sd * np.sqrt(1.0 - correlation**2 * (before >= 0))
+        tests.append(_outlier(left, records, innovation_sd))
     if not rounded and np.any(before >= 0):
         tests.append(_neighbours(left, before, sd, correlation))
     adjusted = [replace(t, p_value=min(1.0, t.p_value * len(tests))) for t in tests]
     return tuple(test for test in adjusted if test.p_value <= FALSE_ALARM)
 
 
-class _Left(NamedTuple):
-    """Independent residuals less all that was absorbed, in noise sds."""
+class _Errors(NamedTuple):
+    """Independent residuals without all that was absorbed, in noise sds."""
 
     # Orthonormal columns of all that was absorbed, (n + p, q).
     basis: np.ndarray
@@ -188,7 +188,7 @@ class _Left(NamedTuple):
     free: int
 
 
-def _independent(data: Whitened, before: np.ndarray, correlation: float) -> _Left:
+def _independent(data: Whitened, before: np.ndarray, correlation: float) -> _Errors:
     size = len(before)
     absorbed, residual = (
         np.concatenate([whiten(table[:size], before, correlation), table[size:]])
@@ -198,10 +198,12 @@ def _independent(data: Whitened, before: np.ndarray, correlation: float) -> _Lef
     error = residual - basis @ (basis.T @ residual)
     kept = 1.0 - np.sum(basis[:size] ** 2, axis=1)
     scaled = error[:size] / np.sqrt(np.maximum(kept, 1e-6))
-    return _Left(basis, error, scaled, len(error) - basis.shape[1])
+    return _Errors(basis, error, scaled, len(error) - basis.shape[1])
 
 
-def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Structure:
+def _neighbours(
+    left: _Errors, before, sd: np.ndarray, correlation: float
+) -> ResidualFinding:
     """Test whether neighbours in a run are correlated more than in the model.
 
     The ratio of quadratic forms has its exact mean and variance under independence,
@@ -211,54 +213,57 @@ def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Stru
 
     def shifted(table: np.ndarray) -> np.ndarray:
         """Return half the row after and half the row before, within runs."""
-        moved = np.zeros_like(table)
-        moved[before[follows]] += 0.5 * table[follows]
-        moved[follows] += 0.5 * table[before[follows]]
-        return moved
+        half = np.zeros_like(table)
+        half[before[follows]] += 0.5 * table[follows]
+        half[follows] += 0.5 * table[before[follows]]
+        return half
 
-    moved, free, pairs = shifted(left.basis), left.free, len(follows)
-    products = left.basis.T @ moved
+    neighbours, free, pairs = shifted(left.basis), left.free, len(follows)
+    products = left.basis.T @ neighbours
     trace = -float(np.trace(products))
-    square = 0.5 * pairs - 2.0 * float(np.sum(moved**2)) + float(np.sum(products**2))
+    square = 0.5 * pairs - 2.0 * float(np.sum(neighbours**2))
+    square += float(np.sum(products**2))
     ratio = float(left.error @ shifted(left.error) / (left.error @ left.error))
     mean = trace / free
     variance = 2.0 * (free * square - trace**2) / (free**2 * (free + 2.0))
     p = float(ndtr((mean - ratio) / np.sqrt(variance)))
-    found = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
-    times = np.sqrt((1.0 + found) / (1.0 - found))
+    excess = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
+    times = np.sqrt((1.0 + excess) / (1.0 - excess))
     rms = float(np.sqrt(np.mean((left.error[:size] * sd) ** 2)))
     beyond = f" beyond the model's {correlation:.2f}" if correlation >= 0.005 else ""
     words = (
-        f"The errors of neighbouring readings are correlated ({found:.2f}{beyond}): "
+        f"The errors of neighbouring readings are correlated ({excess:.2f}{beyond}): "
         f"the intervals of stiffness and mean {{load}} are some {times:.1f} times too "
         "narrow."
     )
-    return Structure(NEIGHBOURS, p, found * rms, words)
+    return ResidualFinding(NEIGHBOURS, p, excess * rms, words)
 
 
-def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
-    """Test whether a reading lies farther off than noise ever does.
+def _outlier(left: _Errors, records: Records, sd: np.ndarray) -> ResidualFinding:
+    """Test whether a reading deviates more than noise can.
 
-    The scale is the median of all errors, which a few wild readings do not change, or
-    the rounding of a display; `sd` [N] is that of each row given the one before.
+    The scale is the median of all errors, which a few outliers do not change, or the
+    rounding of a display; `sd` [N] is that of each row given the one before.
     """
     size, far = len(sd), np.abs(left.scaled)
     rounding = least_step(np.asarray(records.force)) / np.sqrt(12.0)
     scale = np.maximum(float(np.median(far)) / MEDIAN_SIZE, rounding / sd)
     times = far / np.maximum(scale, 1e-300)
-    chance = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
+    p_value = 2.0 * size * stdtr(_EFFICIENCY * left.free, -times)
     row = int(np.argmax(far))
-    wild = np.flatnonzero((chance <= FALSE_ALARM) & (times >= _WILD))
-    # The row after a wild one is off as well.
-    many = int(np.sum(np.diff(wild, prepend=-2) > 1))
-    is_wild = 0 < many <= _FEW and far[row] ** 2 >= _SHARE * float(far @ far)
-    others = f" ({many} such readings)" if many > 1 else ""
-    off = float(far[row] * sd[row])
-    force, place = (float(v[row]) for v in (records.force, records.deformation))
+    outliers = np.flatnonzero((p_value <= FALSE_ALARM) & (times >= _OUTLIER))
+    # The innovation of the row after an outlier is large as well.
+    count = int(np.sum(np.diff(outliers, prepend=-2) > 1))
+    dominates = far[row] ** 2 >= _SHARE * float(far @ far)
+    is_outlier = 0 < count <= _MAX_OUTLIERS and dominates
+    others = f" ({count} such readings)" if count > 1 else ""
+    distance = float(far[row] * sd[row])
+    force, deformation = (float(v[row]) for v in (records.force, records.deformation))
     words = (
-        f"Reading {row + 1}, {force:.4g} {{N}} at {place:.4g} "
-        f"{{mm}}, lies {off:.3g} {{N}} off, "
-        f"{times[row]:.0f} times as far as readings scatter{others}: every number "
-        "here may be off."
+        f"Reading {row + 1}, {force:.4g} {{N}} at {deformation:.4g} {{mm}}, deviates "
+        f"by {distance:.3g} {{N}} from the fit, {times[row]:.0f} times the scatter of "
+        f"the readings{others}: all results may be wrong."
     )
-    return Structure(WILD, float(chance[row]) if is_wild else 1.0, off, words)
+    return ResidualFinding(
+        WILD, float(p_value[row]) if is_outlier else 1.0, distance, words
+    )

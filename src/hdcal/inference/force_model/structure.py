@@ -1,13 +1,13 @@
-"""What the model of a case contains besides line and effects, decided once.
+"""Choice of the model structure: correlated noise and a discrepancy, or neither.
 
 Two questions are answered before any sampling: are the errors of neighbouring readings
-correlated, and does the curve bend? Each answer is that of the evidence of the
-readings, coefficients and noise integrated out. A form that the readings do not show
-is left out: where they are independent and straight the model is that of least squares.
+correlated, and does the curve bend? The structure with the largest evidence is chosen,
+coefficients and noise integrated out. Readings that are independent and straight have
+the model of least squares.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from hdcal.inference.force_model.discrepancy import (
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.force_model.noise_form import BaseForces, base_model, pilot_fit
+from hdcal.inference.force_model.noise_form import LineFit, fit_lines, pilot_fit
 from hdcal.inference.force_model.padding import pad_records
 from hdcal.inference.force_model.serial_correlation import (
     CORRELATION,
@@ -29,21 +29,19 @@ from hdcal.physics.effect import Effect
 
 # Largest rounding step, in noise sds, for which Sheppard's correction is used, with an
 # error of 2 exp(−2π²·0.71²) ~ 1e-4. That noise is known roughly from few rows, and
-# with a mixture it is that of wild readings too.
+# with a mixture it includes that of outliers.
 _FINE_STEP, _FINE_STEP_OF_FEW, _FINE_STEP_OF_A_MIXTURE = 1.3, 0.5, 1e-3
 _FEW_ROWS = 500
-# Three readings for each function of a leftover: of fewer its priors would decide what
-# is bend and what is noise. A line then has both as its noise, and a wider interval.
+# Three readings for each function of a discrepancy: with fewer its priors would
+# separate bend from noise. A line counts both as noise, and has a wider interval.
 _LEAST_ROWS_OF_A_GAP = 3 * BASIS_SIZE
 # What a further part of the model needs: positive evidence, 3 : 1 (Kass and Raftery,
 # Journal of the American Statistical Association 90, 1995).
 _LOG_POSITIVE = np.log(3.0)
-# Why a correlation that could be is not in the model.
+# Why a possible correlation is not in the model.
 NONE_SHOWN = "the readings show none"
-# Without and with.
-_EITHER = (False, True)
-# Points of the hyperparameters: correlation as quantiles of its prior, size of the
-# leftover in noise sds, its length as quantiles of its prior.
+# Nodes of the hyperparameters: correlation as quantiles of its prior, size of the
+# discrepancy in noise sds, its length as quantiles of its prior.
 _CORRELATIONS, _LENGTHS = 8, 4
 _SIZES = np.logspace(-0.5, 3.0, 8)
 
@@ -67,39 +65,35 @@ def decide_structure(
     """Return the structure that the readings of a case show.
 
     What effects explain cannot be distinguished from a bend here, so that with effects
-    a leftover is in the model only on request, by `with_gap`.
+    a discrepancy is in the model only on request, by `with_gap`.
     """
     noise_sd = pilot_fit(case.records).noise_sd
-    base = base_model(case.records, "bend" if effects else "line")
+    lines = fit_lines(case.records, "bend" if effects else "line")
+    if with_gap is None and (effects or not _may_bend(case, lines)):
+        with_gap = False
+    gaps = (False, True) if with_gap is None else (with_gap,)
+    forms = [form for gap in gaps for form in _forms(case, effects, noise_sd, gap)]
+    return forms[0] if len(forms) == 1 else _most_evident(case, lines, forms)
+
+
+def _forms(case: Case, effects, noise_sd: float, gap: bool) -> list[ModelStructure]:
+    """Return the possible structures with a discrepancy, or without one."""
+    rounded = _needs_exact_rounding(case, effects, noise_sd, gap)
+    reason = _why_independent(case, effects, rounded)
+    independent = ModelStructure(noise_sd, rounded, gap, False, reason or NONE_SHOWN)
+    if reason:
+        return [independent]
+    correlated = replace(independent, correlated=True, why_independent="")
     # What the gear file states of the correlation is in the model.
     is_stated = case.gear.scale_priors[CORRELATION].family != "uniform"
-
-    def considered(rounded: bool) -> tuple[str, tuple[bool, ...]]:
-        reason = _why_independent(case, effects, rounded)
-        return reason, (False,) if reason else (True,) if is_stated else _EITHER
-
-    rounded = _needs_exact_rounding(case, effects, noise_sd, bool(with_gap))
-    reason, choices = considered(rounded)
-    if with_gap is None and (effects or not _may_bend(case, base)):
-        with_gap = False
-    gaps = _EITHER if with_gap is None else (with_gap,)
-    gap, correlated = _best_form(case, base, gaps, choices)
-    coarse = _needs_exact_rounding(case, effects, noise_sd, gap)
-    if coarse != rounded:
-        # With a leftover the steps are taken for noise, which may be correlated.
-        rounded = coarse
-        reason, choices = considered(rounded)
-        gap, correlated = _best_form(case, base, (gap,), choices)
-    if not (reason or correlated):
-        reason = NONE_SHOWN
-    return ModelStructure(noise_sd, rounded, gap, correlated, reason)
+    return [correlated] if is_stated else [independent, correlated]
 
 
-def _may_bend(case: Case, base: BaseForces) -> bool:
+def _may_bend(case: Case, lines: LineFit) -> bool:
     """Return whether rows are enough, and a line misses one by more than its step."""
     if len(case.records.force) < _LEAST_ROWS_OF_A_GAP:
         return False
-    return float(np.max(np.abs(base.residual))) > case.gear.force_resolution
+    return float(np.max(np.abs(lines.residual))) > case.gear.force_resolution
 
 
 def _needs_exact_rounding(case: Case, effects, noise_sd: float, with_gap: bool) -> bool:
@@ -126,61 +120,59 @@ def _why_independent(case: Case, effects, rounded: bool) -> str:
     return ""
 
 
-def _best_form(
-    case: Case, base: BaseForces, gaps: tuple[bool, ...], choices: tuple[bool, ...]
-) -> tuple[bool, bool]:
-    """Return whether there is a leftover and a correlation, of those considered."""
-    forms = [(gap, correlated) for gap in gaps for correlated in choices]
-    if len(forms) == 1:
-        return forms[0]
+def _most_evident(
+    case: Case, lines: LineFit, forms: Sequence[ModelStructure]
+) -> ModelStructure:
+    """Return the structure with the largest evidence."""
     records, priors = case.records, case.gear.scale_priors
-    others, scales = base.force[:, None], []
-    if any(gaps):
+    others, scales = lines.force[:, None], []
+    if any(form.with_gap for form in forms):
         gap = build_discrepancy(records)
         shapes = np.asarray(discrepancy_columns(gap, pad_records(records)))
         others = np.column_stack([shapes[: len(others)], others])
         lengths = quantiles(priors["gap_length"], _LENGTHS, "gap_length")
         scales = [np.asarray(gap.prior_sd(1.0, length)) for length in lengths]
-    columns = base.columns
+    columns = lines.columns
     table = np.hstack([columns, others - columns @ (columns.T @ others)])
     before, width = previous_rows(records), columns.shape[1]
     rho = quantiles(priors[CORRELATION], _CORRELATIONS, CORRELATION)
 
-    def log_evidence(form: tuple[bool, bool]) -> float:
-        products = whitened_products(table, before, rho if form[1] else np.zeros(1))
-        chances = [
-            volume + chance
-            for gram, volume in zip(*products, strict=True)
-            for chance in _log_chances(
-                gram, width, len(table), scales if form[0] else []
-            )
+    def log_evidence(form: ModelStructure) -> float:
+        at = rho if form.correlated else np.zeros(1)
+        used = scales if form.with_gap else []
+        evidences = [
+            log_det + log_evidence
+            for gram, log_det in zip(*whitened_products(table, before, at), strict=True)
+            for log_evidence in _log_evidences(gram, width, len(table), used)
         ]
-        mean = np.logaddexp.reduce(chances) - np.log(len(chances))
-        return mean - sum(form) * _LOG_POSITIVE
+        mean = np.logaddexp.reduce(evidences) - np.log(len(evidences))
+        return mean - (form.with_gap + form.correlated) * _LOG_POSITIVE
 
     return max(forms, key=log_evidence)
 
 
-def _log_chances(
+def _log_evidences(
     gram: np.ndarray, width: int, rows: int, scales: Sequence[np.ndarray]
 ) -> Iterator[float]:
-    """Yield log probabilities of the rows, up to a constant.
+    """Yield the log evidence of the rows at each node, up to a constant.
 
-    Coefficients of the base, noise and weights of the leftover are integrated out.
-    `gram` has the products of the whitened columns: base, leftover, force; `scales` the
-    prior sd of each weight of the leftover for a size of one, at each of its lengths.
+    Coefficients of the lines, noise and weights of the discrepancy are integrated out.
+    `gram` has the products of the whitened columns: lines, discrepancy, force; `scales`
+    the prior sd of each weight for a discrepancy of size one, at each of its lengths.
     """
     base, cross, rest = gram[:width, :width], gram[:width, width:], gram[width:, width:]
     rest = rest - cross.T @ np.linalg.solve(base, cross)
-    volume, free = 0.5 * np.linalg.slogdet(base)[1], rows - width
+    log_det, free = np.linalg.slogdet(base)[1], rows - width
     square = max(rest[-1, -1], 1e-300)
     if not scales:
-        yield -volume - 0.5 * free * np.log(square)
+        yield -0.5 * (log_det + free * np.log(square))
     for scale in scales:
-        strength, turn = np.linalg.eigh(scale[:, None] * rest[:-1, :-1] * scale)
-        strength, along = np.maximum(strength, 0.0), turn.T @ (scale * rest[:-1, -1])
+        products = scale[:, None] * rest[:-1, :-1] * scale
+        eigenvalues, eigenvectors = np.linalg.eigh(products)
+        eigenvalues = np.maximum(eigenvalues, 0.0)
+        along = eigenvectors.T @ (scale * rest[:-1, -1])
         for gain in _SIZES**2:
-            left = square - np.sum(gain * along**2 / (1.0 + gain * strength))
+            left = square - np.sum(gain * along**2 / (1.0 + gain * eigenvalues))
             left = max(left, 1e-12 * square)
-            volumes = volume + 0.5 * np.sum(np.log1p(gain * strength))
-            yield -volumes - 0.5 * free * np.log(left)
+            log_dets = log_det + np.sum(np.log1p(gain * eigenvalues))
+            yield -0.5 * (log_dets + free * np.log(left))

@@ -5,56 +5,63 @@ Gains and zeros of the gauges that a certificate states are between true and as 
     F_read = (1 + g) F + b,   ω_read = (1 + h) ω,   T_read = T + θ,
 
 with ω₀ in the reading of the deformation. The likelihood, the loss of modulus with
-temperature α, effects and leftover are in terms of what was read; E₀, K and the
+temperature α, effects and discrepancy are in terms of what was read; E₀, K and the
 stiffness are true. What no certificate states is left out.
 """
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.inference.sampled_problem import Values
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
 if TYPE_CHECKING:
     from hdcal.inference.force_model.problem import Problem
 
-# Float scalars and arrays by site name.
-Values = Mapping[str, Any]
-
-# Least noise sd that rounded readings distinguish from none, in steps; twice as much
-# noise is raised by 5e-4 of it.
+# Site of each kind of parameter with one value per run, specimen or function of the
+# discrepancy, and site of the sd between runs and between specimens.
+MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "discrepancy": "gap_weights",
+}
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
+# Smallest noise sd, in rounding steps, that rounded readings can distinguish from zero.
+# Noise of twice this size is increased by 5e-4 (relative).
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
-def with_gains(values: Values, ratio: Any) -> Any:
+def apply_gains(values: Values, ratio: Any) -> Any:
     """Return force per deformation as read from the true one."""
     gain = 1.0 + values.get("force_gain", 0.0)
     return ratio * gain / (1.0 + values.get("deformation_gain", 0.0))
 
 
-def where_read(values: Values, stiffness: Any) -> Any:
-    """Return the stiffness where T_ref is read from that at a true T_ref."""
+def stiffness_at_read_reference(values: Values, stiffness: Any) -> Any:
+    """Return the true stiffness where T_ref is read, from that at the true T_ref."""
     offset = values.get("temperature_offset", 0.0)
     return stiffness / (1.0 - values["alpha"] * offset)
 
 
-def as_read(values: Values, stiffness: Any) -> Any:
+def stiffness_as_read(values: Values, stiffness: Any) -> Any:
     """Return the stiffness as read, where T_ref is read, from the true one at T_ref."""
-    return with_gains(values, where_read(values, stiffness))
+    return apply_gains(values, stiffness_at_read_reference(values, stiffness))
 
 
-def shown(values: Values, deformation: Any, temperature: Any) -> tuple[Any, Any]:
-    """Return what the gauges show at a true deformation and temperature."""
+def gauge_readings(
+    values: Values, deformation: Any, temperature: Any
+) -> tuple[Any, Any]:
+    """Return what the gauges read at a true deformation and temperature."""
     deformation = deformation * (1.0 + values.get("deformation_gain", 0.0))
     return deformation, temperature + values.get("temperature_offset", 0.0)
 
 
-def acting(values: Values, force: Any) -> Any:
-    """Return the force that acts from one that is read, zero taken off."""
+def true_force(values: Values, force: Any) -> Any:
+    """Return the true force from a reading without its zero."""
     return force / (1.0 + values.get("force_gain", 0.0))
 
 
@@ -71,7 +78,7 @@ def member_base(problem: "Problem", values: Values, run=None, specimen=None) -> 
     values (integrated out) count as zero.
     """
     scale, offset = values["K"] * values["E0"] * problem.unit_stiffness, 0.0
-    scale = as_read(values, scale)
+    scale = stiffness_as_read(values, scale)
     if specimen is not None and "specimen_deviation" in values:
         scale = scale * (1.0 + values["specimen_deviation"][specimen])
     if run is not None and "run_offset" in values:
@@ -106,15 +113,21 @@ def predict_rows(
     return mean, noise
 
 
+def rounding_variance(step: Any) -> Any:
+    """Return the variance of rounding to a step, after Sheppard."""
+    return step**2 / 12.0
+
+
 def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
     """Add Sheppard's variance of the rounding to the noise.
 
-    Where rounding has its exact likelihood, the noise is at least what such readings
-    distinguish from none: without any the likelihood has walls that no sampler passes.
-    The smooth maximum leaves larger noise as it is, for what is predicted from it.
+    Where rounding has its exact likelihood, the noise is at least `LEAST_NOISE` steps:
+    without noise the likelihood is a step function, which a gradient sampler cannot
+    cross. The maximum is smooth, and leaves larger noise unchanged.
     """
     if not rounded:
-        return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + step**2 / 12.0))
+        sd = jnp.sqrt(noise.sd**2 + rounding_variance(step))
+        return Noise(noise.log_weight, sd)
     logs = jnp.log(noise.sd), jnp.log(LEAST_NOISE * step)
     power = jnp.logaddexp(*(_SHARPNESS * log for log in logs))
     return Noise(noise.log_weight, jnp.exp(power / _SHARPNESS))

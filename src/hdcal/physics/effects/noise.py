@@ -52,15 +52,17 @@ class Outliers(Effect, stage="noise", family="noise", mixture=True):
     Source: Tukey's contamination model (1960).
     """
 
-    fraction: Scalar = parameter("1", "share of wild readings", typical=0.07, null=0.0)
+    fraction: Scalar = parameter("1", "share of outliers", typical=0.07, null=0.0)
     ratio: Scalar = parameter(
-        "1", "noise sd of a wild reading over an ordinary one", typical=5.0
+        "1", "noise sd of an outlier over that of an ordinary reading", typical=5.0
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
-        wild = jnp.log(self.fraction + _NONE)
-        tame = jnp.log1p(-self.fraction)
+        outlier = jnp.log(self.fraction + _NONE)
+        ordinary = jnp.log1p(-self.fraction)
         return Noise(
-            jnp.concatenate([signal.log_weight + tame, signal.log_weight + wild]),
+            jnp.concatenate(
+                [signal.log_weight + ordinary, signal.log_weight + outlier]
+            ),
             jnp.concatenate([signal.sd, signal.sd * self.ratio]),
         )
