@@ -172,7 +172,7 @@ def spoiled(table: pd.DataFrame, how: str) -> pd.DataFrame:
 
 def failing(gear, library, seed: int):
     if gear.specimen_labels == ("G5",):
-        return Finding(gear.name, "its evidence failed", "Leave it out")
+        return Finding(gear.name, "its evidence cannot be computed", "Leave it out")
     return weighed(gear, library, seed)
 
 

@@ -30,7 +30,10 @@ class HeteroscedasticNoise(Effect, stage="noise", family="noise"):
     """
 
     share: Scalar = parameter(
-        "1", "noise per force, beside the noise at no force", typical=0.007, null=0.0
+        "1",
+        "noise per force, in addition to the noise at no force",
+        typical=0.007,
+        null=0.0,
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
@@ -52,9 +55,9 @@ class Outliers(Effect, stage="noise", family="noise", mixture=True):
     Source: Tukey's contamination model (1960).
     """
 
-    fraction: Scalar = parameter("1", "share of wild readings", typical=0.07, null=0.0)
+    fraction: Scalar = parameter("1", "share of outliers", typical=0.07, null=0.0)
     ratio: Scalar = parameter(
-        "1", "noise sd of a wild reading over an ordinary one", typical=5.0
+        "1", "noise sd of an outlier over that of an ordinary reading", typical=5.0
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
