@@ -202,4 +202,4 @@ def test_what_is_no_number_or_no_table_is_refused():
     for given in ([{"force_N": 1.0}], np.ones((5, 2)), 3):
         with pytest.raises(InputError, match="Give a path, a DataFrame, or arrays"):
             hdcal.read_case(given)
-    assert "'a' is no number" in str(InputError(implausible("seed", "a")))
+    assert "'a' is not a number" in str(InputError(implausible("seed", "a")))

@@ -101,13 +101,13 @@ def _run(arguments: list[str], console: Console) -> int:
             raise
         what = " ".join(str(error).split())[:200]
         if isinstance(error, OSError):
-            words = f"the system refused: {what}"
+            words = f"operating system error: {what}"
             if error.filename is None:
                 # Standard output on a full disk.
                 discard(sys.stdout)
         else:
             words = f"internal error ({type(error).__name__}: {what}); please report "
-            words += "it, with the output of HDCAL_DEBUG=1"
+            words += "it with the output of HDCAL_DEBUG=1"
         console.failure("error", words)
         return NOT_TO_BE_USED
 

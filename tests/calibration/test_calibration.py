@@ -61,7 +61,7 @@ def test_a_posterior_survives_the_disk_and_rebuilds_its_problem(tmp_path):
         ({"effects": ["coulomb_frction"]}, "Did you mean 'coulomb_friction'"),
         ({"effects": ["coulomb_friction"]}, "needs unloading"),
         ({"effects": ["rig_compliance"]}, "needs readings of the rig alone"),
-        ({"effects": "outliers"}, "is one text"),
+        ({"effects": "outliers"}, "is not a list"),
         ({"chains": 1}, "chains"),
         ({"warmup": 0}, "warmup"),
         ({"draws": 2}, "draws"),

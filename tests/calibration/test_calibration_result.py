@@ -93,7 +93,7 @@ def test_steps_are_ordered_and_each_has_a_sentence():
     check = Check(PLAUSIBLE, "warning", "K = 2e+03, expected 0.5 to 8")
     found = calibration_of(replace(posterior, checks=(check,)))
     assert found.steps == ("implausible", *plain.steps)
-    assert found.next_step and found.next_step.startswith("First check the units")
+    assert found.next_step and found.next_step.startswith("Check the units")
 
 
 def test_a_shape_of_the_residuals_is_in_headline_and_steps():
@@ -117,7 +117,7 @@ def test_charts_show_readings_bands_and_densities():
     (readings,) = (mark for mark in top.marks if isinstance(mark, Points))
     np.testing.assert_array_equal(readings.y, posterior.case.records.force)
     labels = {mark.label for mark in top.marks if isinstance(mark, Band)}
-    assert {"mean force", "with the leftover discrepancy"} <= labels
+    assert {"mean force", "with the discrepancy"} <= labels
     (median,) = (m for m in below.marks if isinstance(m, Line) and m.dash == "solid")
     assert np.nanmax(np.abs(median.y)) == 0.0
     residual = [panel.x for panel in charts["residuals"].panels]

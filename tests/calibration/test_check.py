@@ -51,7 +51,7 @@ def test_findings_of_all_files_are_reported_at_once(here: Hdcal, line: Path):
     (line / "C.csv").write_text(HEADERS["A"] + "\n0.1,abc\n" + "0.2,1\n" * 5)
     done = here("check", "line", "--sheet", "Probe")
     assert done.returncode == 2
-    for words in ("line/B.csv", "line/C.csv, row 2", "--sheet: has no meaning"):
+    for words in ("line/B.csv", "line/C.csv, row 2", "--sheet: cannot be combined"):
         assert words in done.stderr
 
 

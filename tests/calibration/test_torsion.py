@@ -168,5 +168,5 @@ def test_a_fleet_of_torques_refuses_forces(tmp_path):
     assert products[:, 0, 3] / products[:, 0, 0] == pytest.approx(STIFFNESS, rel=0.02)
     forces = {"deformation_mm": range(6), "force_N": [0, 20.1, 39.9, 60.2, 80, 99.8]}
     _file(tmp_path, "d.csv", forces)
-    with pytest.raises(InputError, match="holds forces"):
+    with pytest.raises(InputError, match="contains forces"):
         usable(read_fleet(tmp_path))

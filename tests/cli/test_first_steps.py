@@ -67,7 +67,7 @@ def test_init_writes_a_sheet_of_a_workbook(here: Hdcal, tmp_path: Path):
             "hdcal: --length: is missing. State it.\n"
             "hdcal: --deformation: is missing. State it.\n",
         ),
-        (["--wall", "50", *BEGUN[2:]], "not thinner than the radius"),
+        (["--wall", "50", *BEGUN[2:]], "not less than the radius"),
         ([*SIZES, "--deformation", "radiall"], "'radial', 'diametral'"),
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
         ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),

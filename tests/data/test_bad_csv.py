@@ -25,7 +25,7 @@ def fourth(cell):
 # Content, and (row, column, words) of every finding.
 CASES = {
     "empty": ("\n \n\t\n", [(None, None, "empty")]),
-    "no header": (GOOD, [(1, None, "headers should be")]),
+    "no header": (GOOD, [(1, None, "contains numbers")]),
     "neither": ("a,b\n" + GOOD, [(1, "deformation", "no c"), (1, "force", "no c")]),
     "negative sd": (
         timed(1, 1, -1, 1, 1, header=T.replace("time_s", "force_sd_N")),
@@ -41,14 +41,18 @@ CASES = {
             (3, "deformation_mm", "'x'"),
             (6, "temperature_C", "'inf'"),
             (4, "temperature_C", "absolute zero"),
-            (4, "time_s", "goes back"),
+            (4, "time_s", "time decreases"),
         ],
     ),
     "a thousand bad rows": (
         H + "0,0\n" + "".join(f"1,x{k}\n" for k in range(1000)) + "1\n0\n\n" * 30,
         [
-            (1003, None, "60 rows in all, also rows 1004, 1006"),
-            (3, "force_N", "1000 rows in all, also rows 4, 5, 6, 7, 8, 9 and 993 more"),
+            (1003, None, "60 rows in total, also rows 1004, 1006"),
+            (
+                3,
+                "force_N",
+                "1000 rows in total, also rows 4, 5, 6, 7, 8, 9 and 993 more",
+            ),
         ],
     ),
 }
@@ -111,12 +115,12 @@ def test_bad_table(folder, name):
 @pytest.mark.parametrize(
     ("columns", "expected"),
     [
-        ({"force": "Load[N]"}, (1, "Load", "not there")),
+        ({"force": "Load[N]"}, (1, "Load", "does not exist")),
         ({"force": "force_N[psi]"}, (1, "force_N", "'psi'")),
         ({"force": "extra"}, (1, "extra", "[UNIT]")),
         ({"forse": "force_N[N]"}, (None, None, "mean 'force'")),
         ({"time": "force_N[s]"}, (1, "force_N", "both as force and as time")),
-        ({"time": "twin[s]"}, (1, "twin", "fits 2 columns")),
+        ({"time": "twin[s]"}, (1, "twin", "matches 2 columns")),
     ],
 )
 def test_bad_mapping(folder, columns, expected):
@@ -176,7 +180,7 @@ def test_one_of_several_specimens_is_read_alone(folder):
     assert case.specimen_labels == ("b",) and case.run_labels == ("3", "4")
     assert np.array_equal(case.records.force, whole.records.force[6:])
     assert not {"specimen", "specimens"} & case.records.known
-    with pytest.raises(InputError, match="There are 'a/1', 'b'"):
+    with pytest.raises(InputError, match="The specimens are 'a/1', 'b'"):
         read_case(data, specimen="x")
     table = pd.read_csv(data)
     table.loc[6:, "Weg [mm]"] = 0.1

@@ -16,7 +16,7 @@ CASES = {
     "no sizes": (
         "[gear]\n",
         [
-            (f"gear.{size}_mm", "or take the theory 'spring'")
+            (f"gear.{size}_mm", "or use theory = 'spring'")
             for size in ("wall_thickness", "radius", "length")
         ],
     ),
@@ -38,7 +38,11 @@ CASES = {
 ONE = [
     (GEAR + "lenght_mm = 3\n", "gear.lenght_mm", "'length_mm'"),
     (GEAR + "[measurment]\n", "measurment", "'measurement'"),
-    (GEAR.replace("0.68", "40.0"), "gear.wall_thickness_mm", "not thinner"),
+    (
+        GEAR.replace("0.68", "40.0"),
+        "gear.wall_thickness_mm",
+        "wall thickness is not less",
+    ),
     (GEAR.replace("70.0", "nan"), "gear.length_mm", "finite"),
     (GEAR.replace("70.0", '"70"'), "gear.length_mm", "number"),
     (GEAR + 'material = "40CrNiMo"\n', "gear.material", "'40CrNiMoA'"),
@@ -47,11 +51,11 @@ ONE = [
     (GEAR + "load_height_mm = 71\n", "gear.load_height_mm", "beyond the length"),
     (
         GEAR + "nominal_deformation_mm = 40\n",
-        *("gear.nominal_deformation_mm", "below the radius"),
+        *("gear.nominal_deformation_mm", "less than the radius"),
     ),
     ("priors = 3\n" + GEAR, "priors", ""),
-    (GEAR + "radius_mm = 3\n", None, "not TOML"),
-    (GEAR + "name = " + "[" * 5000, None, "not TOML"),
+    (GEAR + "radius_mm = 3\n", None, "not valid TOML"),
+    (GEAR + "name = " + "[" * 5000, None, "not valid TOML"),
     (GEAR + "[rig]\nfilter_Hz = inf\n", "rig.filter_Hz", "finite"),
     (P + "force_gain = { family = 'fixed', value = 1 }\n", "priors.force_gain", ""),
     (P + 'Eo = { family = "normal" }\n', "priors.Eo", "'E0'"),
@@ -64,10 +68,10 @@ ENTRIES = [
     ("K", "family = 'log-normal', median = 2, log_sd = 1", ".family", "'lognormal'"),
     ("K", "family = 'lognormal', median = 2", ".log_sd", "is missing"),
     ("K", "family = 'lognormal', median = 2, log_sd = 1, sd = 1", ".sd", "unknown key"),
-    ("K", "family = 'uniform', low = 3, high = 2", ".high", "not below"),
+    ("K", "family = 'uniform', low = 3, high = 2", ".high", "not less than"),
     ("sigma", "family = 'half_normal', sd = -1", ".sd", "not positive"),
     ("E0", "family = 'normal', mean = 207, sd = 3", "", "without a unit"),
-    ("E0", "family = 'normal', mean = 7, sd = 3, unit = 'N'", ".unit", "not measure"),
+    ("E0", "family = 'normal', mean = 7, sd = 3, unit = 'N'", ".unit", "not a unit"),
     ("slack.c", "family = 'half_normal', sd = 1, unit = 'mA'", ".unit", "not a unit"),
     ("K", "family = 'normal', mean = -2, sd = 1", ".mean", "does not lie"),
     ("E0", "family = 'normal', mean = 7, sd = 3, unit = '9**9'", ".unit", "not a unit"),
@@ -117,7 +121,7 @@ def test_every_finding_is_at_its_key(tmp_path, name):
     ("raw", "words"),
     [
         (b"\xff\xfe[gear]", "UTF-8"),
-        (b"a = 1\n\0", "not TOML"),
+        (b"a = 1\n\0", "not valid TOML"),
         (b"#" * (1 << 21), "larger than 1 MiB"),
     ],
 )

@@ -18,7 +18,7 @@ def _case(force, x=_LINE, step=None, **labels):
 @pytest.mark.parametrize("ask", [calibrate, diagnose])
 @pytest.mark.parametrize("line", [lambda x: 100 * x + 2, lambda x: 100 / 3 * x - 7.1])
 def test_an_exact_line_is_refused(ask, line):
-    with pytest.raises(InputError, match="on a straight line to the last digit"):
+    with pytest.raises(InputError, match="exactly on a straight line"):
         ask(_case(line(_LINE)))
 
 

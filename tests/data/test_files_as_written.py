@@ -154,7 +154,10 @@ REFUSED = [
         text("Displacement (mm),Force left (N),Force right (N)\n", lines(more=FORCE)),
         "the force may be 'Force left (N)' or 'Force right (N)'",
     ),
-    (text("Displacement (mm),Load (g)\n", BODY), "g is a mass; its weight is gf"),
+    (
+        text("Displacement (mm),Load (g)\n", BODY),
+        "g is a mass; the unit of its weight is gf",
+    ),
     (
         "Weg [mm];Kraft [N]\n" + "".join(f"0,{k}00;1.70{k}\n" for k in range(6)),
         "decimal point among decimal commas",
@@ -165,13 +168,13 @@ REFUSED = [
     ),
     (
         "Weg [um];Kraft [N]\n100;380\n200;567\n300;734\n400;981\n500;1.234\n",
-        "'1.234' may be a thousand",
+        "'1.234' may be in thousands",
     ),
     (
         "Weg [mm];Kraft [N]\n0,1;0,5\n0,2;2,5\n0,3;4,5\n0,4;10.04,00\n0,5;8,5\n",
         "row 5, column 'Kraft [N]': '10.04,00' is not a number",
     ),
-    (text("Weg [mm];Kraft [N]\nmm;kN\n", SEMI), "names N, and the row of units kN"),
+    (text("Weg [mm];Kraft [N]\nmm;kN\n", SEMI), "states N, but the row of units kN"),
     (
         text("deformation_mm;force_N\n", lines(";"), "0.6;ERR\n0.7\n")
         + text("deformation_mm;force_N\n", lines(";")),

@@ -56,7 +56,7 @@ def test_a_finding_names_row_and_column(folder, cell):
     (found,) = caught.value.findings
     assert (found.file, found.row, found.column) == ("DataFrame", 10, "Kraft [kN]")
     for data, words in (
-        ({"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}, "is no table"),
+        ({"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}, "is not a table"),
         (pd.concat({"rig": FRAME}, axis=1), "columns of several levels"),
         (3, "is a int"),
     ):
@@ -70,13 +70,13 @@ def test_columns_that_are_only_counted_have_no_headers():
     asked = {"deformation": "1[mm]", "force": "2[kN]"}
     case = hdcal.read_case(counted, columns=asked)
     np.testing.assert_array_equal(case.records.deformation, X)
-    with pytest.raises(InputError, match="numbers where the headers should be"):
+    with pytest.raises(InputError, match="row contains numbers"):
         hdcal.read_case(counted)
 
 
 def test_a_broken_file_is_refused(tmp_path):
     (tmp_path / "a").write_bytes(b"PAR1" + bytes(range(256)) * 4)
-    with pytest.raises(InputError, match="is no Parquet file"):
+    with pytest.raises(InputError, match="is not a readable Parquet file"):
         hdcal.read_case(tmp_path / "a")
 
 
@@ -107,7 +107,7 @@ def test_a_unit_against_its_header_has_a_note():
     np.testing.assert_array_equal(case.records.force, 1000.0 * KN)
     case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
     assert case.records.force.max() == KN.max()
-    assert any("though it names kN" in note for note in case.notes)
+    assert any("although its header states kN" in note for note in case.notes)
 
 
 def test_without_a_gear_file_the_stiffness_is_that_of_the_readings(tmp_path):
@@ -137,7 +137,7 @@ def test_without_a_gear_file_the_stiffness_is_that_of_the_readings(tmp_path):
 @pytest.mark.parametrize(
     ("header", "cells", "words"),
     [
-        ("Temperatur", [20.0] * 9, "temperature, is not used, as it names no unit"),
+        ("Temperatur", [20.0] * 9, "temperature, is not used, as it has no unit"),
         ("Versuch", [*"abcdefghi"], "run, is not used, as it differs from row to row"),
     ],
 )

@@ -43,7 +43,7 @@ def test_dates_in_iso_8601_are_read():
 def test_a_date_in_another_form_has_a_note(written):
     case = read_case(table().assign(date=written))
     assert case.dates == ()
-    assert any(written in note and "year first" in note for note in case.notes)
+    assert any(written in note and "year-month-day" in note for note in case.notes)
 
 
 def test_each_day_and_rig_of_a_gear_is_a_mounting():

@@ -140,7 +140,7 @@ def test_lots_are_those_of_gears_and_operators_those_of_mountings(folder):
     assert case.records.force[-1] == 23.0
     case = read(folder, LOTS.replace("A,9,L1,Moss,2,0.2", "A,9,L2,Kern,2,0.2"))
     assert (case.lots, case.operators) == ((), ())
-    assert "lots are not used: specimen 'A' has several" in case.notes
+    assert "the column lot is not used: specimen 'A' has several values" in case.notes
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,9 @@ def test_the_articles_table():
     spread = np.sqrt(np.sum((y - slope * x) ** 2) / 13)
     assert slope == pytest.approx(198.02, abs=5e-3)
     assert spread == pytest.approx(2.727, abs=5e-4)
-    assert case.notes == ("2 of 14 forces are not multiples of 0.98 N",)
+    assert case.notes == (
+        "2 of 14 forces are not multiples of the stated resolution of 0.98 N",
+    )
     assert np.array_equal(case.records.direction, np.ones(14))
     assert case.gear.geometry.load_height == 62.0
 

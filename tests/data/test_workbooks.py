@@ -48,24 +48,24 @@ def test_of_two_tables_one_has_to_be_named(folder):
     other = [(x, 2.0 * f) for x, f in READINGS]
     path = book(folder, first=[*HEAD, *READINGS], second=[*HEAD, *other])
     for asked, words in (
-        ({}, "2 sheets hold a table: 'first', 'second'"),
+        ({}, "2 sheets contain a table: 'first', 'second'"),
         ({"sheet": "third"}, "no `sheet` 'third'"),
-        ({"encoding": "cp1252"}, "no `encoding`"),
+        ({"encoding": "cp1252"}, "no text encoding"),
     ):
         with pytest.raises(InputError, match=words):
             read_case(path, **asked)
-    with pytest.raises(InputError, match="no `sheet`"):
+    with pytest.raises(InputError, match="not a workbook"):
         read_case(folder, sheet="first")
     np.testing.assert_allclose(read_case(path, sheet="second").records.force, 2 * FORCE)
 
 
 def test_what_is_no_workbook_of_readings_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no sheet holds a table"):
+    with pytest.raises(InputError, match="no sheet contains a table"):
         read_case(book(tmp_path, notes=[("nothing", "here")]))
     path = tmp_path / "other.xlsx"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("readme.txt", "no workbook")
-    with pytest.raises(InputError, match="no workbook that can be read"):
+        archive.writestr("readme.txt", "not a workbook")
+    with pytest.raises(InputError, match="not a readable workbook"):
         read_case(path)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for part in range(5):

@@ -65,18 +65,24 @@ def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (["design", "RUN"], ["nothing is asked"]),
-        (["design", "RUN", "--window", "0.3:0.5", "--limit-force", "7"], ["both ask"]),
-        (["design", "RUN", "--window", ".3:.5", "--vary", WALL], ["--vary: has no"]),
+        (["design", "RUN"], ["neither is given"]),
+        (
+            ["design", "RUN", "--window", "0.3:0.5", "--limit-force", "7"],
+            ["both are given"],
+        ),
+        (
+            ["design", "RUN", "--window", ".3:.5", "--vary", WALL],
+            ["--vary: cannot be combined"],
+        ),
         (
             ["design", "RUN", "--limit-force", "70 mm", "--vary", "wall_tickness=1:x"],
             ["'70 mm' is not a force", "Did you mean 'wall_thickness_mm'", "LO:HI"],
         ),
         (["design", "nowhere", "--limit-force", "9"], ["there is no such file"]),
-        (["study", "RUN"], ["nothing is varied"]),
+        (["study", "RUN"], ["no size is varied"]),
         (
             ["study", "RUN", "--vary", "wall_thickness_mm=60"],
-            ["not thinner than the radius"],
+            ["not less than the radius"],
         ),
     ],
 )

@@ -105,15 +105,19 @@ def test_a_gear_that_is_pulled_has_the_mirrored_design():
 @pytest.mark.parametrize(
     ("vary", "changed", "words"),
     [
-        ({}, {}, "nothing may change"),
+        ({}, {}, "no size is varied"),
         ({"wal_thickness_mm": (0.5, 0.6)}, {}, "Did you mean 'wall_thickness_mm'"),
-        ({"load_height_mm": (50.0, 60.0)}, {}, "changes nothing under the theory"),
-        (WALL, {"limit_force": -60.0}, "-60 N is no limit where 0.4 mm takes"),
+        ({"load_height_mm": (50.0, 60.0)}, {}, "has no influence under the theory"),
+        (WALL, {"limit_force": -60.0}, "-60 N is not plausible: 0.4 mm needs"),
         ({"wall_thickness_mm": (0.6, 0.5)}, {}, "0.6:0.5 is empty"),
         (WALL, {"limit_stress": 0.0}, "0 MPa does not lie between"),
-        (WALL, {"limit_force": 120_000.0}, "is no limit where 0.4 mm takes"),
-        (WALL, {"tolerances": {"wall_thickness_mm": 0.5}}, "on a size of 0.68 mm"),
-        ({"wall_thickness_mm": (0.65, 0.8)}, {"limit_force": 40.0}, "nothing keeps 40"),
+        (WALL, {"limit_force": 120_000.0}, "is not plausible: 0.4 mm needs"),
+        (WALL, {"tolerances": {"wall_thickness_mm": 0.5}}, "is too large for 0.68 mm"),
+        (
+            {"wall_thickness_mm": (0.65, 0.8)},
+            {"limit_force": 40.0},
+            "no design keeps 40",
+        ),
     ],
 )
 def test_bad_input_is_refused(vary, changed, words):

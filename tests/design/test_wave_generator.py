@@ -149,7 +149,7 @@ def test_a_generator_that_pulls_is_the_mirror_of_one_that_presses():
         ({"window": (0.399, 0.401), "setting_sd": 0.01}, "no spring rate between"),
         ({"probability": 0.9999}, "cannot be estimated from 1000 independent draws"),
         ({"setting_sd": -1.0}, "-1 mm does not lie between 0 and 1000"),
-        ({"temperatures": [2900.0]}, "Young's modulus by half"),
+        ({"temperatures": [2900.0]}, "Young's modulus would change by half"),
         ({"tolerances": {"wall": 0.1}}, "unknown choice 'wall'"),
         ({"models": bent(1000, -2.0)}, "does not grow with deformation"),
     ],

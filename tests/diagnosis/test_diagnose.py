@@ -131,9 +131,12 @@ def test_runs_that_were_measured_are_not_suggested():
         for records in (replace(ramp(60), known=frozenset({"time"})), rich())
     )
     done = {"load and unload at the same rate", "load and unload four times faster"}
-    done |= {"load, then hold the top for a minute", "load and unload at 50 °C"}
+    done |= {
+        "load, then hold the largest deformation for one minute",
+        "load and unload at 50 °C",
+    }
     assert done <= new and not done & measured
-    back = "go back to the first temperature, 20 °C, and load again"
+    back = "return to the first temperature, 20 °C, and load again"
     assert back in measured - new
 
 

@@ -130,10 +130,10 @@ def test_without_an_effect_on_the_mean_a_loop_is_outside_the_library(names):
 @pytest.mark.parametrize(
     ("force", "words"),
     [
-        (lambda x: 0.0 * x, "last digit"),
-        (lambda x: 7.0 + 0.0 * x, "last digit"),
-        (lambda x: 200.0 * x, "last digit"),
-        (lambda x: -400.0 * x + 0.3 * np.cos(99.0 * x), "does not grow"),
+        (lambda x: 0.0 * x, "exactly on a straight line"),
+        (lambda x: 7.0 + 0.0 * x, "exactly on a straight line"),
+        (lambda x: 200.0 * x, "exactly on a straight line"),
+        (lambda x: -400.0 * x + 0.3 * np.cos(99.0 * x), "does not increase"),
     ],
 )
 def test_forces_without_scatter_and_falling_forces_are_refused(force, words: str):

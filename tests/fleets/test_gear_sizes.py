@@ -40,7 +40,7 @@ def test_the_load_acts_at_the_end_of_another_length_unless_its_height_is_stated(
 
 def test_a_gear_without_a_size_is_left_out_and_an_impossible_size_refused():
     readings, table = read_fleet(records(), SIZES), TABLE.drop(index=6)
-    assert "1 of 8 gears is bad" in refused(usable, readings, table)[-1]
+    assert "1 of 8 gears is faulty" in refused(usable, readings, table)[-1]
     found = usable(readings, table, skip_bad=True)
     assert {*found.case.left_out} == {"G6"}
     assert found.size_ratio == pytest.approx((WALLS[[0, 1, 2, 3, 4, 5, 7]] / 0.68) ** 3)
@@ -72,7 +72,7 @@ def test_without_sizes_in_a_gear_file_a_table_has_no_meaning():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (TABLE.assign(wall_thickness_mm=50.0), "not thinner than the radius"),
+        (TABLE.assign(wall_thickness_mm=50.0), "not less than the radius"),
         (TABLE.assign(load_height_mm=90.0), "beyond the length"),
         (TABLE.assign(wall_thickness_mm=-1.0), "-1"),
         (TABLE.iloc[:0], "has no row"),

@@ -176,9 +176,9 @@ def test_a_faulty_cell_names_its_gear_and_file(
 def test_files_that_are_no_table_of_gears_are_refused(tmp_path):
     frame, path = records(), tmp_path / "line.parquet"
     path.write_bytes(b"PAR1 and nothing else")
-    assert "no Parquet file that can be read" in refused(read_fleet, path)[0]
+    assert "not a readable Parquet file" in refused(read_fleet, path)[0]
     frame.drop(columns="gear").to_parquet(path, index=False)
-    assert "which gear" in refused(read_fleet, path)[0]
+    assert "names the gear" in refused(read_fleet, path)[0]
     frame.assign(force_N="a").to_parquet(tmp_path / "other.parquet", index=False)
     frame.to_parquet(path, index=False)
     assert "other.parquet" in refused(read_fleet, tmp_path)[0]
@@ -257,7 +257,7 @@ def test_a_file_for_each_gear(tmp_path):
     lines[3] = ",".join(cells)
     (folder / "G4.csv").write_text("\n".join(lines))
     words = refused(usable, read_fleet(folder))
-    assert "'abc'" in "".join(words) and "2 of 6 gears are bad" in words[-1]
+    assert "'abc'" in "".join(words) and "2 of 6 gears are faulty" in words[-1]
     found = usable(read_fleet(folder), skip_bad=True)
     assert found.case.specimen_labels == ("G0", "G1", "G2", "G3")
     assert found.case.left_out["G4"].row == 4
@@ -285,7 +285,7 @@ def test_a_folder_for_each_gear_states_its_sizes(tmp_path):
     assert "G2" in refused(usable, read_fleet(folder))[0]
     assert {*usable(read_fleet(folder), skip_bad=True).case.left_out} == {"G2"}
     frame.to_csv(folder / "G1.csv", index=False)
-    assert any("as folders" in words for words in refused(read_fleet, folder))
+    assert any("folders of gears" in words for words in refused(read_fleet, folder))
 
 
 def test_a_gear_with_a_fault_in_one_file_is_left_out_of_all(tmp_path):

@@ -85,7 +85,7 @@ def test_a_fault_is_named_and_its_gear_left_out_whole(spoil, words, source, tmp_
     found = read_fleet(data)
     first, offer = refused(usable, found)
     assert f"gear '{ODD}': " in first and words in first
-    assert offer.startswith("skip_bad: 1 of 8 gears is bad: 'G3'")
+    assert offer.startswith("skip_bad: 1 of 8 gears is faulty: 'G3'")
     left = usable(found, skip_bad=True)
     assert [*left.case.left_out] == [ODD]
     sound = frame[frame["gear"] != ODD]
@@ -114,7 +114,7 @@ def test_a_repaired_record_stays_with_a_note_that_names_the_gear(tmp_path):
     frame.to_parquet(tmp_path / "line.parquet", index=False)
     for data in (frame, tmp_path / "line.parquet"):
         found = usable(read_fleet(data))
-        (note,) = (note for note in found.case.notes if "wild" in note)
+        (note,) = (note for note in found.case.notes if "outliers" in note)
         assert f"gear '{ODD}'" in note
         assert found.sums.rows.tolist() == [60.0] * 3 + [59.0] + [60.0] * 4
 

@@ -190,9 +190,9 @@ def test_dry_friction_is_flagged_by_the_residuals(ratio, friction, flagged):
 @pytest.mark.parametrize(
     ("columns", "labels", "words"),
     [
-        ({"known": frozenset()}, {}, "no column holds the time"),
+        ({"known": frozenset()}, {}, "no column contains the time"),
         ({"time": np.repeat(np.arange(100.0), 2)}, {}, "not later than"),
-        ({"force_sd": np.full(200, 0.5)}, {}, "gives an sd of the force"),
+        ({"force_sd": np.full(200, 0.5)}, {}, "states an sd of the force"),
         ({}, {"run_labels": ("1", "2")}, "several runs"),
     ],
 )

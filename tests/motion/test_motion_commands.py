@@ -70,7 +70,7 @@ def test_a_sampled_force_is_answered_with_a_folder(here: Hdcal, run: Path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("force_N\n1\n2\n", "no column holds the time"),
+        ("force_N\n1\n2\n", "no column contains the time"),
         ("time_s,force_stone\n0,1\n1,2\n", "unknown unit"),
     ],
 )
@@ -85,6 +85,6 @@ def test_options_of_other_models_are_refused(here: Hdcal, case: Path):
     given = ["--dynamic", "--effect", "relaxation", "--with-gap"]
     done = here("calibrate", case, *given)
     assert done.returncode == 2
-    assert done.stderr.count("does not go with --dynamic") == 2
+    assert done.stderr.count("cannot be combined with --dynamic") == 2
     # A ramp without a clock is no motion.
     assert here("calibrate", case, "--dynamic").returncode == 2

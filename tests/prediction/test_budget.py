@@ -58,20 +58,20 @@ def test_every_source_has_a_row():
         "calibration (stiffness, zeros, effects)",
         "reading noise",
         "which effect acts",
-        "mounting to mounting",
-        "gear to gear",
+        "scatter between mountings",
+        "scatter between gears",
         "tolerance of the wall thickness",
-        "bend that the readings leave possible",
-        "zero of the gauge with temperature",
-        "frame of the rig with temperature",
+        "curvature that the readings do not exclude",
+        "zero drift of the gauge with temperature",
+        "expansion of the rig with temperature",
     ):
         assert rows[name].share > 0.0, name
     types = {name: row.type_ for name, row in rows.items()}
-    assert types["reading noise"] == types["gear to gear"] == "A"
-    assert types["zero of the gauge with temperature"] == "B"
-    zero = rows["zero of the gauge with temperature"].contribution_N
+    assert types["reading noise"] == types["scatter between gears"] == "A"
+    assert types["zero drift of the gauge with temperature"] == "B"
+    zero = rows["zero drift of the gauge with temperature"].contribution_N
     assert zero == pytest.approx(0.1 * 40.0, rel=0.1)
-    frame = rows["frame of the rig with temperature"]
+    frame = rows["expansion of the rig with temperature"]
     assert (frame.unit, frame.distribution) == ("mm", "normal")
     assert frame.standard_uncertainty == pytest.approx(0.04, rel=0.02)
     stiffness = 205.0 * 1.02 * (1.0 - 40.0 * 3e-4)
@@ -140,7 +140,7 @@ def test_an_unstated_zero_of_a_load_is_that_of_first_contact():
     found = hdcal.margin(with_zeros(0.02), 0.4, quantity="load")
     check(found)
     rows = by_component(found)
-    contact, gauge = rows["place of first contact"], rows["zero of the force gauge"]
+    contact, gauge = rows["position of first contact"], rows["zero of the force gauge"]
     assert (contact.type_, contact.unit, contact.distribution) == ("B", "mm", "prior")
     assert contact.standard_uncertainty == pytest.approx(0.02, rel=0.05)
     assert contact.sensitivity_N_per_unit == pytest.approx(-205.0, rel=0.05)

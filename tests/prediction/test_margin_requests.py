@@ -92,7 +92,7 @@ def test_a_deformation_far_from_the_readings_is_a_slip_of_the_unit():
     """A spring has no radius, which a deformation could be larger than."""
     assert hdcal.margin(spring(), 0.4).part == "part"
     for ask in (hdcal.margin, lambda p, at: hdcal.predict(p, [at])):
-        with pytest.raises(InputError, match="Give it in mm") as refused:
+        with pytest.raises(InputError, match="Give the deformation in mm") as refused:
             ask(spring(), 400.0)
         assert fields(refused) == ["deformation"]
 

@@ -91,7 +91,10 @@ def test_margin_writes_a_folder(here: Hdcal, runs, tmp_path: Path):
 
 BAD = {
     "missing folder": (["nowhere", *AT], "nowhere"),
-    "deformation in um": (["{one}", "--deformation", "400"], "Give it in mm"),
+    "deformation in um": (
+        ["{one}", "--deformation", "400"],
+        "Give the deformation in mm",
+    ),
     "no tolerance": (["{one}", *AT, "--tolerance", "thin"], "is not NAME="),
     "certificate without a folder": (["{one}", *AT, "--certificate"], "certificate"),
 }

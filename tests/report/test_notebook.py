@@ -27,7 +27,7 @@ def results():
         "Posterior": (posterior, "per millimetre as read"),
         "Response": (
             hdcal.respond(still_posterior(), "step", points=21, draws=20),
-            "The deformation reaches",
+            "The largest deformation is",
         ),
         "Diagnosis": (
             judged(simulated(rich(), {"hysteresis": {"force": 4.0, "reach": 0.1}})),
@@ -73,7 +73,7 @@ def test_a_verdict_stands_for_its_models(results):
     found = hdcal.predict(verdict, [0.2, 0.4]).to_frame()
     listed = hdcal.predict(pairs, [0.2, 0.4]).to_frame()
     assert found.equals(listed)
-    with pytest.raises(InputError, match="a quick diagnosis holds none"):
+    with pytest.raises(InputError, match="a quick diagnosis contains none"):
         hdcal.margin(results["Diagnosis"][0], 0.4)
 
 
@@ -85,7 +85,7 @@ def test_what_is_no_case_or_model_is_told_so(results):
             InputError, match=r"a DataFrame, not a Case\. Read it first"
         ):
             asked(frame)
-    with pytest.raises(InputError, match="Case is no calibrated model"):
+    with pytest.raises(InputError, match="Case is not a calibrated model"):
         hdcal.margin(case, 0.4)
     with pytest.raises(InputError, match=r"as \['hysteresis'\]"):
         hdcal.calibrate(case, effects="hysteresis")

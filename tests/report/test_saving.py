@@ -114,7 +114,7 @@ def test_impossible_targets_are_refused(tmp_path: Path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "readings.csv").write_text("deformation,force\n")
     for name in ("pipe", ".", "readings.csv"):
-        with pytest.raises(InputError, match="is not a file that hdcal wrote"):
+        with pytest.raises(InputError, match="was not written by hdcal"):
             Target(f"{tmp_path}/{name}", force=True, beginning=b"x")
     assert set(os.listdir(tmp_path)) == {"file", "pipe", "readings.csv"}
 

@@ -34,7 +34,7 @@ def test_cut_rows_leave_the_records():
     case = hdcal.read_case(frame)
     assert len(case.records.force) == ROWS - 2
     assert case.screening.kept.sum() == ROWS - 2
-    assert any("wild" in note and "rows 32, 72" in note for note in case.notes)
+    assert any("outliers" in note and "rows 32, 72" in note for note in case.notes)
 
 
 def test_direction_is_not_derived_from_a_trembling_gauge():

@@ -42,7 +42,7 @@ def test_the_gear_file_may_state_it_and_the_caller_overrides_it():
     gear = {**SIZES, "range": "10.5%:40.5%"}
     assert len(hdcal.read_case(TABLE, gear).records.force) == 30
     assert len(hdcal.read_case(TABLE, gear, range="0:0.5").records.force) == 51
-    with pytest.raises(InputError, match="is no range"):
+    with pytest.raises(InputError, match="is not a range"):
         hdcal.read_case(TABLE, {**SIZES, "range": "from 1 to 2"})
     with pytest.raises(InputError, match=r"2 of 101 rows.*from 0 to 1 mm"):
         hdcal.read_case(TABLE, range="0.10:0.115")
@@ -75,6 +75,6 @@ def test_of_an_angle_the_range_is_in_radians(here):
     inside = np.radians(degrees)
     inside = inside[(inside >= 0.05) & (inside <= 0.2)]
     np.testing.assert_allclose(case.records.deformation, inside, rtol=1e-12)
-    with pytest.raises(InputError, match=r"rad.*read from 0 to 0.3491 rad"):
+    with pytest.raises(InputError, match=r"rad.*ranges from 0 to 0.3491 rad"):
         hdcal.read_case(table, range="3:12")
     assert "angle [rad]" in " ".join(here("check", "--help").stdout.split())

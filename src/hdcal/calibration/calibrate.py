@@ -35,11 +35,11 @@ from hdcal.physics.registry import EFFECTS
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
 _SHARE = f"{HeteroscedasticNoise.name}.share"
-_GROWING = "wide, as the readings scatter more at larger forces"
+_GROWING = "wide, because the readings scatter more at larger forces"
 _SHOWN = {_SHARE: Prior("half_normal", (0.2,), "1", _GROWING)}
 # The constant part is then about this share of what a pilot fit leaves.
 _PART, _PART_LOG_SD = 0.3, 0.7
-_PART_SOURCE = "a part of the noise that a pilot fit leaves, which was found to grow"
+_PART_SOURCE = "the constant part of the residual noise of a preliminary fit"
 
 
 def choose_effects(
@@ -48,7 +48,7 @@ def choose_effects(
     """Look effects up by name in a library; `InputError` if it lacks one."""
     if isinstance(names, str):
         remedy = f"Give a list of names, as ['{names}']"
-        raise InputError([Finding("effects", f"'{names}' is one text", remedy)])
+        raise InputError([Finding("effects", f"'{names}' is not a list", remedy)])
     check_names(names, registry, "effects")
     return tuple(registry[name] for name in dict.fromkeys(names))
 

@@ -63,9 +63,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
             Panel(
                 x=axis,
                 y=load_axis(units, "measured − model"),
-                title="distance from the model"
-                if len(levels) == 1
-                else f"at {level:g} °C",
+                title="residual" if len(levels) == 1 else f"at {level:g} °C",
                 marks=[
                     *marks,
                     Rule(at=0.0),

@@ -27,8 +27,8 @@ from hdcal.errors import Finding
 @click.option(
     "--with-gap/--no-gap",
     default=None,
-    help="Model a smooth discrepancy, or leave it out [default: model it if "
-    "the readings show a bend; never with an effect].",
+    help="Include a smooth discrepancy in the model, or not [default: included if the "
+    "readings show curvature; never with an effect].",
 )
 @click.option(
     "--dynamic",
@@ -54,7 +54,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
         effects = settings["effects"]
         for name in ("with_gap", "effects") if dynamic else ():
             if settings.pop(name):
-                words = "does not go with --dynamic, which has no such model"
+                words = "cannot be combined with --dynamic"
                 wrong.append(Finding(name, words, "Leave it out"))
         size = ("chains", "warmup", "draws", "seed")
         wrong.attempt(check_settings, **{name: settings[name] for name in size})

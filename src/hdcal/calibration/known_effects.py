@@ -18,7 +18,7 @@ def check_names(
     with Findings() as findings:
         for name in names:
             if name not in registry:
-                problem = f"no effect is called '{name}'"
+                problem = f"unknown effect '{name}'"
                 remedy = did_you_mean(name, sorted(registry))
                 findings.append(Finding(parameter, problem, remedy))
 
@@ -40,14 +40,14 @@ def check_effect_priors(
     with Findings() as findings:
         for name, prior in case.gear.effect_priors.items():
             if name in scatter:
-                problem = "has its prior under another name"
-                remedy = f"Give it as {scatter[name]}"
+                problem = "is not the name of this prior"
+                remedy = f"State it as {scatter[name]}"
             elif name not in known:
-                problem = "is no parameter of an effect in the library"
+                problem = "is not a parameter of an effect in the library"
                 remedy = did_you_mean(name, [*known])
             elif prior.unit not in ("", known[name]):
                 problem = f"has the unit {prior.unit}, not {known[name]}"
-                remedy = f"Give it in {known[name]}"
+                remedy = f"State it in {known[name]}"
             else:
                 continue
             column = f"priors.{name}"

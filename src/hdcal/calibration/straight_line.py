@@ -80,20 +80,20 @@ def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> "Chec
 
     name, line = "the stiffness is that of a straight line", robust_line(records)
     if line is None:
-        return Check(name, "note", "no slope: the {displacement} does not change")
+        return Check(name, "note", "no slope: the {displacement} is constant")
     low, middle, high = np.quantile(stiffness, [0.025, 0.5, 0.975])
     difference = abs(middle - line.slope)
     is_near = difference <= max(
         (high - low) / 2.0 + line.half_width, LEAST_DIFFERENCE * abs(line.slope)
     )
     words = (
-        f"the model has {middle:.4g} {{N/mm}} ({low:.4g} to {high:.4g}), a "
+        f"the model gives {middle:.4g} {{N/mm}} ({low:.4g} to {high:.4g}), a "
         f"robust straight line through the same readings {line.slope:.4g} ± "
         f"{line.half_width:.2g} {{N/mm}}"
     )
     if is_near and (sized or line.slope > line.half_width):
         return Check(name, "passed", words)
-    remedy = "Look at the readings with `hdcal check`; choose a part of them"
+    remedy = "Check the readings with `hdcal check`; choose a range of them"
     return Check(name, "failed", f"{words}. {remedy}")
 
 
@@ -119,14 +119,14 @@ def straight_check(case: Case, stiffness: np.ndarray) -> "Check":
     name, part = "the curve has one stiffness", _part(case)
     middle = float(np.median(stiffness))
     if part is None or abs(middle - part.slope) <= _tolerance(part, LEAST_DIFFERENCE):
-        return Check(name, "passed", "no straight part has another one")
+        return Check(name, "passed", "no straight part has a different stiffness")
     units = case.units
     ends = f"{part.low:.4g} to {part.high:.4g} {units.displacement_unit}"
     words = (
-        f"the curve is no straight line: its longest straight part, {ends}, has "
-        f"{part.slope:.4g} {units.stiffness_unit} and the model {middle:.4g}. "
-        "Choose the longest straight part of the record by the range straight, another "
-        "one by its ends, or all of the curve by the range all"
+        f"the curve is not straight: its longest straight part, {ends}, has "
+        f"{part.slope:.4g} {units.stiffness_unit}, but the model {middle:.4g}. State "
+        "a range: straight (the longest straight part), the ends of another part, or "
+        "all (the whole curve)"
     )
     return Check(name, "failed", words)
 

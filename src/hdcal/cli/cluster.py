@@ -38,7 +38,7 @@ def completed_on_cluster(
         except (KilledWorker, CancelledError, OSError) as error:
             words = "the connection to the scheduler was lost"
             if isinstance(error, KilledWorker):
-                words = "one task has killed several workers (memory?)"
+                words = "one task stopped several workers, possibly for lack of memory"
             raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
 
 
@@ -59,7 +59,7 @@ def _client(address: str) -> Iterator[Any]:
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split())[:120]
         words = f"no scheduler answers at '{address[:80]}' ({reason})"
-        remedy = "Start one with 'dask scheduler' and name its address"
+        remedy = "Start one with 'dask scheduler' and give its address"
         raise _refusal(words, remedy) from None
     try:
         client.wait_for_workers(1, timeout=_SECONDS_FOR_A_WORKER)

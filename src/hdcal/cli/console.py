@@ -33,7 +33,7 @@ def _would_replace_input(out: str) -> list[Finding]:
             read += [value] if isinstance(value, str) else value
     if os.path.realpath(out) not in map(os.path.realpath, read):
         return []
-    return [Finding("out", f"{quoted(out)} is also an input", "Name another folder")]
+    return [Finding("out", f"{quoted(out)} is also an input", "Give another folder")]
 
 
 class Console:

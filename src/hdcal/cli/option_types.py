@@ -67,7 +67,7 @@ def unit_findings(units: Quantities, **given: float | None) -> Iterator[Finding]
     """Yield a finding for each option given in N or mm where torques were measured."""
     for name, value in given.items():
         if isinstance(value, InUnit) and not units.is_force:
-            problem = "is in the unit of a force or a length, but the data are "
+            problem = "has the unit of a force or a length, but the data are "
             problem += f"{units.load}s over {units.displacement}s"
             unit = f"{units.displacement_unit} or {units.load_unit}"
             yield Finding(name, problem, f"Write the number without unit, in {unit}")
@@ -81,7 +81,7 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     match = _QUANTITY.fullmatch(text)
     remedy = f"Write it like {example}, with a decimal point"
     if match is None:
-        raise _refused(option, f"'{text}' is no number", remedy)
+        raise _refused(option, f"'{text}' is not a number", remedy)
     number = float(match["number"])
     if match["unit"] is None:
         return number
@@ -118,8 +118,8 @@ def read_grid(text: str, option: str) -> list[float]:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
         problem = f"'{text}' is neither start:stop:count nor a list of numbers"
-        most = f"with at most {RANGES['points'].high} points"
-        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, {most}"
+        most = f"at most {RANGES['points'].high} numbers"
+        remedy = f"Write it like 0:0.6:61 or 0.1,0.2 ({most})"
         raise _refused(option, problem, remedy)
     return numbers
 
@@ -128,7 +128,7 @@ def read_deformations(text: str, option: str) -> list[float]:
     """Read a grid; refuse 0,4, which may have a decimal comma or be a list."""
     if _DECIMAL_COMMA.fullmatch(text):
         first, second = text.strip().split(",")
-        problem = f"'{text}' is a list of two numbers, or one with a decimal comma"
+        problem = f"'{text}' may be two numbers, or one with a decimal comma"
         remedy = f"Write {first}.{second} for one, {first}:{float(second):g}:2 for two"
         raise _refused(option, problem, remedy)
     return read_grid(text, option)
@@ -149,7 +149,7 @@ def read_window(text: str, option: str, *, count: int = 2) -> list[float]:
         return read_grid(text, option)
     low, high = read_ends(text, option)
     if high < low:
-        problem = f"'{text}' is an empty window"
+        problem = f"'{text}' is an empty range"
         raise _refused(option, problem, "Give the lower end first")
     return _between(low, high, count if high > low else 1)
 

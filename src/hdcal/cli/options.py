@@ -44,7 +44,7 @@ def repeated_option(
 sheet_option = click.option(
     "--sheet",
     metavar="NAME",
-    help="Of a workbook (.xlsx) [default: the one with readings].",
+    help="Read this sheet of a workbook (.xlsx) [default: the one with readings].",
 )
 column_option = repeated_option(
     "--column",
@@ -63,7 +63,8 @@ reading_options = combined(
     click.option(
         "--gear",
         metavar="GEAR.toml",
-        help="Read the gear from this file [default: gear.toml beside the data].",
+        help="Read the gear from this file [default: gear.toml in the folder of the "
+        "data].",
     ),
     click.option(
         "--encoding",
@@ -78,10 +79,10 @@ reading_options = combined(
     click.option(
         "--range",
         metavar="LOW:HIGH",
-        help="Use the readings in this range: 0.1:0.6 of the deformation [mm] or angle "
-        "[rad], 10%:40% of the largest force, straight for the longest straight part, "
-        "or all until the force drops for good [default: all; calibrate takes straight "
-        "where the curve is not a line].",
+        help="Use the readings in a range: 0.1:0.6 (deformation [mm] or angle [rad]), "
+        "10%:40% (of the largest force), straight (the longest straight part) or all "
+        "(until the force drops permanently) [default: all; calibrate uses straight if "
+        "the curve is not straight].",
     ),
 )
 # Which case is read, and how.
@@ -111,7 +112,7 @@ library_option = click.option(
 skip_bad_option = click.option(
     "--skip-bad",
     is_flag=True,
-    help="Leave out gears with bad input, and list them.",
+    help="Leave out gears with faulty data, and list them.",
 )
 # Read by the program before the command; declared so that click accepts it.
 json_option = click.option(
@@ -157,15 +158,20 @@ seed_option = click.option(
     help="Set the seed of all random numbers.",
 )
 sampling_options = combined(
-    click.option("--chains", default=4, show_default=True, help="Run so many chains."),
+    click.option(
+        "--chains", default=4, show_default=True, help="Set the number of chains."
+    ),
     click.option(
         "--warmup",
         default=1000,
         show_default=True,
-        help="Adapt each chain for so many iterations.",
+        help="Set the number of warm-up iterations per chain.",
     ),
     click.option(
-        "--draws", default=1000, show_default=True, help="Keep so many draws per chain."
+        "--draws",
+        default=1000,
+        show_default=True,
+        help="Set the number of draws per chain.",
     ),
     seed_option,
 )
@@ -179,5 +185,5 @@ def is_given(name: str) -> bool:
 
 def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:
     """Return a finding for each of these parameters that was given with a mode."""
-    problem = f"has no meaning with {mode}"
+    problem = f"cannot be combined with {mode}"
     return [Finding(name, problem, "Leave it out") for name in names if is_given(name)]

@@ -138,7 +138,7 @@ class Case:
 def require_force(case: Case, question: str) -> None:
     """Raise InputError where torques and angles were measured."""
     if not case.units.is_force:
-        words = f"{question} needs forces, and the readings are torques over angles"
+        words = f"{question} needs forces, but the readings are torques over angles"
         remedy = "Use check, calibrate, diagnose, predict, margin, fleet or compare"
         raise InputError([Finding(case.name, words, remedy)])
 

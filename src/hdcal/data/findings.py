@@ -61,7 +61,7 @@ class FileFindings(Findings):
                     [other.row for other in others if other.row is not None]
                 )
                 count = len(others) + 1
-                problem = f"{problem}; the same in {count} rows in all, also {rows}"
+                problem = f"{problem}; the same in {count} rows in total, also {rows}"
             self.add(problem, first.remedy, first.row, column)
 
     def refuse(self, problem: str, remedy: str, row: int | None = None) -> NoReturn:
@@ -77,13 +77,13 @@ def why_not_readable(path: Path, largest: int) -> tuple[str, str] | None:
     except (OSError, ValueError):
         return None
     if stat.S_ISDIR(status.st_mode):
-        return "is a folder", "Name the file inside it"
+        return "is a folder", "Give a file in it"
     if not stat.S_ISREG(status.st_mode):
-        return "is a pipe or a device, which may never end", "Write it to a file first"
+        return "is a pipe or a device, not a file", "Write the data to a file first"
     if status.st_size > largest:
         unit = max(one for one in _UNITS if largest >= one)
         words = f"is larger than {largest // unit} {_UNITS[unit]}"
-        return words, "Name another file, or thin this out"
+        return words, "Reduce the number of readings"
     return None
 
 
@@ -92,4 +92,4 @@ def did_you_mean(name: str, known: list[str]) -> str:
     by_lower = {item.lower(): item for item in known}
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
     hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
-    return f"{hint}Known are: {', '.join(known)}"
+    return f"{hint}Known names: {', '.join(known)}"

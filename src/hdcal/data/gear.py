@@ -157,8 +157,8 @@ def _named_material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
     # A typing error only: the nearest name may be quite another steel.
     near = get_close_matches(name, shipped, n=1, cutoff=0.85)
     hint = f"Did you mean '{near[0]}'? " if near else ""
-    known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
-    remedy = f"{hint}{known}; for another one give the path of a .toml file"
+    known = f"Available: {', '.join(shipped)} ('steel' is any steel)"
+    remedy = f"{hint}{known}; for another material give the path of a .toml file"
     raise toml.error(f"unknown material '{name}'", remedy, "gear.material")
 
 

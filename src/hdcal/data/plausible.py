@@ -45,64 +45,66 @@ class Range(NamedTuple):
             return f"a number of more than 300 digits {unit}".rstrip()
 
 
-_SCATTER = "from nothing to as large as the largest force"
-_STEEL = "from the softest gel to ten times diamond"
-_CAPACITY = "from a letter scale's to a large ship's"
-_MASS = "from a nanogram to a million tonnes"
+_SCATTER = "at most the largest force"
+_STEEL = "from soft gels to ten times diamond"
+_CAPACITY = "from the smallest to the largest load cells"
+_MASS = "from 1 ng to 1,000,000 t"
 RANGES = {
     # readings
-    "deformation": Range(-1e5, 1e5, "mm", "no rig is two hundred metres long"),
-    "force": Range(-1e9, 1e9, "N", "no rig presses with the weight of a large ship"),
-    "temperature": Range(-273.15, 3e3, "°C", "absolute zero, and where steel boils"),
-    "time": Range(-1e12, 1e12, "s", "thirty thousand years"),
-    "angle": Range(-1e9, 1e9, "rad", "a hundred million turns"),
-    "torque": Range(-1e9, 1e9, "N·m", "no rig twists with a ship on a metre's arm"),
+    "deformation": Range(-1e5, 1e5, "mm", "no test rig is 200 m long"),
+    "force": Range(-1e9, 1e9, "N", "no testing machine reaches it"),
+    "temperature": Range(
+        -273.15, 3e3, "°C", "absolute zero to the boiling point of steel"
+    ),
+    "time": Range(-1e12, 1e12, "s", "about 30,000 years"),
+    "angle": Range(-1e9, 1e9, "rad", "about 160 million turns"),
+    "torque": Range(-1e9, 1e9, "N·m", "no testing machine reaches it"),
     "force_sd": Range(0.0, 1e9, "N", _SCATTER),
     # what a calibration certificate of a gauge states
-    "expanded_percent": Range(1e-6, 20.0, "%", "no gauge with a certificate is worse"),
-    "expanded_K": Range(1e-6, 50.0, "K", "no gauge with a certificate is worse"),
-    "k": Range(1.0, 5.0, "", "from a standard uncertainty to beyond every table"),
+    "expanded_percent": Range(1e-6, 20.0, "%", "certified gauges are more exact"),
+    "expanded_K": Range(1e-6, 50.0, "K", "certified gauges are more exact"),
+    "k": Range(1.0, 5.0, "", "the usual coverage factors"),
     # the gear and its priors
-    "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
+    "size": Range(1e-6, 1e5, "mm", "from 1 nm to 100 m"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
     "load_cell_capacity": Range(1e-3, 1e9, "N", _CAPACITY),
-    "filter": Range(1e-6, 1e9, "Hz", "from a reading in ten days to a radio's"),
-    "K": Range(1e-6, 1e6, "", "a millionth to a million times the theory"),
-    "spring_stiffness": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
+    "filter": Range(1e-6, 1e9, "Hz", "the bandwidth of any gauge"),
+    "K": Range(1e-6, 1e6, "", "1e-6 to 1e6 times the theory"),
+    "spring_stiffness": Range(1e-12, 1e12, "N/mm", "the stiffness of any part"),
     "E0": Range(1e-6, 1e7, "MPa", _STEEL),
-    "alpha": Range(-1.0, 1.0, "1/K", "nothing loses all of its stiffness in a kelvin"),
+    "alpha": Range(-1.0, 1.0, "1/K", "no material loses all stiffness in 1 K"),
     "sigma": Range(1e-15, 1e9, "N", _SCATTER),
-    "correlation": Range(0.0, 1.0, "", "from independent to all alike"),
-    "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
-    "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
+    "correlation": Range(0.0, 1.0, "", "0: independent, 1: equal"),
+    "specimen_sd": Range(1e-9, 1e3, "", "up to 1000 times the stiffness"),
+    "gap_length": Range(1e-6, 1e6, "", "1e-6 to 1e6 times the tested range"),
     "mass": Range(1e-15, 1e6, "N·s²/mm", _MASS, written=(1e3, "kg")),
-    "damping_ratio": Range(1e-9, 1e3, "", "from a bell to tar"),
-    "initial_velocity": Range(-1e9, 1e9, "mm/s", "far beyond the speed of sound"),
-    "deformation_sigma": Range(1e-15, 1e3, "mm", "from nothing to a metre"),
-    "poisson": Range(0.0, 0.5, "", "what an isotropic solid can have", inner=True),
-    "density": Range(1e-13, 1e-6, "N·s²/mm⁴", "from smoke to beyond any metal"),
-    "cte": Range(-1.0, 1.0, "1/K", "nothing doubles its length in a kelvin"),
+    "damping_ratio": Range(1e-9, 1e3, "", "the damping of any structure"),
+    "initial_velocity": Range(-1e9, 1e9, "mm/s", "far above the speed of sound"),
+    "deformation_sigma": Range(1e-15, 1e3, "mm", "up to 1 m"),
+    "poisson": Range(0.0, 0.5, "", "the limits of an isotropic solid", inner=True),
+    "density": Range(1e-13, 1e-6, "N·s²/mm⁴", "from gases to beyond any metal"),
+    "cte": Range(-1.0, 1.0, "1/K", "no material doubles its length in 1 K"),
     "yield_strength": Range(1e-6, 1e7, "MPa", _STEEL),
-    "effect": Range(-1e15, 1e15, "", "of any parameter of an effect, in code units"),
-    "log_sd": Range(1e-9, 100.0, "", "a hundred powers of e"),
-    "beta": Range(1e-6, 1e9, "", "any shape that is not a spike"),
+    "effect": Range(-1e15, 1e15, "", "any parameter of an effect, in N, mm, s"),
+    "log_sd": Range(1e-9, 100.0, "", "up to a factor of exp(100)"),
+    "beta": Range(1e-6, 1e9, "", "any shape that is not a single value"),
     # what is asked
-    "share": Range(0.0, 1.0, "", "a share, neither none nor all", inner=True),
+    "share": Range(0.0, 1.0, "", "more than 0 and less than 1", inner=True),
     "limit_stress": Range(1e-6, 1e7, "MPa", _STEEL),
-    "tolerance": Range(0.0, 1e5, "mm", "from exact to a hundred metres"),
-    "setting_sd": Range(0.0, 1e3, "mm", "from exact to a metre"),
-    "duration": Range(1e-9, 1e9, "s", "from a nanosecond to thirty years"),
-    "damping": Range(0.0, 1e9, "N·s/mm", "from none to as stiff as a wall"),
+    "tolerance": Range(0.0, 1e5, "mm", "up to 100 m"),
+    "setting_sd": Range(0.0, 1e3, "mm", "up to 1 m"),
+    "duration": Range(1e-9, 1e9, "s", "from 1 ns to 30 years"),
+    "damping": Range(0.0, 1e9, "N·s/mm", "the damping of any structure"),
     # how it is computed
-    "points": Range(2, 100_001, "", "a line has two ends, a plot no more room"),
-    "gears": Range(20, 10_000, "", "fewer have no spread, more take hours"),
-    "chains": Range(2, 64, "", "one cannot be compared, more add nothing"),
+    "points": Range(2, 100_001, "", "a curve needs 2, a figure shows no more"),
+    "gears": Range(20, 10_000, "", "fewer show no scatter, more take hours"),
+    "chains": Range(2, 64, "", "one cannot be checked, more add nothing"),
     "warmup": Range(1, 1_000_000, "", "more take days"),
     "draws": Range(4, 1_000_000, "", "fewer cannot be checked, more take days"),
     "seed": Range(0, 2**32 - 1, "", "32 bits"),
     "jobs": Range(1, 256, "", "processes of one machine"),
-    "degree": Range(1, 9, "", "higher ones leave no digits"),
-    "alarm_rows": Range(10.0, 1e9, "", "less is noise, more is never"),
+    "degree": Range(1, 9, "", "higher degrees have large rounding errors"),
+    "alarm_rows": Range(10.0, 1e9, "", "noise alarms sooner, more is no alarm"),
 }
 # Parameters, keys of files and options that are such a quantity under another name.
 NAMES = {
@@ -148,12 +150,12 @@ def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
         numbers = [] if given is None else [given]
     for number in numbers:
         if isinstance(number, str):
-            return [Finding(name, f"{quoted(number)} is no number", "Give one")]
+            return [Finding(name, f"{quoted(number)} is not a number", "Give a number")]
         if not known.holds(number):
             words = f"{known.shown(number)} {known.problem()}"
             unit = " and its unit" if known.unit else ""
             return [Finding(name, words, f"Check the number{unit}")]
         if known.whole and number != int(number):
-            words = f"{known.shown(number)} is no whole number"
+            words = f"{known.shown(number)} is not a whole number"
             return [Finding(name, words, "Give a whole number")]
     return []

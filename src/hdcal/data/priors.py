@@ -74,20 +74,20 @@ def _known_unit(text: str, info: ValidationInfo) -> str:
         remedy = f'Write unit = "{wanted}"' if wanted else 'Write one such as "N/mm"'
         raise fault(str(error), remedy) from None
     if wanted is not None and name != wanted:
-        words = f"'{text}' does not measure this"
+        words = f"'{text}' is not a unit of this parameter"
         raise fault(words, f'Write a unit that converts to "{wanted}"')
     return text
 
 
 def _positive(number: float) -> float:
     if number <= 0.0:
-        raise fault(f"{number:g} is not positive", "Write its size")
+        raise fault(f"{number:g} is not positive", "Write a positive number")
     return number
 
 
 def _above_low(number: float, info: ValidationInfo) -> float:
     if not info.data.get("low", -float("inf")) < number:
-        raise fault("low is not below high", "Exchange them")
+        raise fault("low is not less than high", "Exchange low and high")
     return number
 
 
@@ -138,7 +138,7 @@ def read_prior(
         raise toml.error("is given without a unit", remedy, key)
     scale, known_unit = (1.0, unit or "") if table.unit is None else to_code(table.unit)
     if family == "beta" and scale != 1.0:
-        words = "a beta prior lies between 0 and 1"
+        words = "a beta prior has no unit, as it lies between 0 and 1"
         raise toml.error(words, 'Write unit = "1"', f"{key}.unit")
     stated = [str(text) for text in (table.source, table.note) if text is not None]
     source = ". ".join(stated) or f"given in {Path(toml.file).name}"
@@ -164,8 +164,8 @@ def _check_numbers(prior: Prior, quantity: str, key: str, toml: TomlFile) -> Non
         if quantity == "noise_correlation" and not wrong:
             bounded = prior.family in ("beta", "uniform", "fixed")
             if not bounded or (prior.family, *prior.numbers) == ("fixed", 1.0):
-                words = "a correlation lies from 0 to below 1"
-                remedy = 'Write family = "beta", or "uniform" or "fixed" within that'
+                words = "a correlation must be from 0 to below 1"
+                remedy = 'Write family = "beta", or "uniform" or "fixed" in this range'
                 name = "value" if bounded else "family"
                 wrong.append(toml.finding(words, remedy, f"{key}.{name}"))
 
@@ -194,7 +194,7 @@ def read_entries(
                 entries = {f"{name}.{n}": (e, f"{key}.{n}") for n, e in entry.items()}
             else:
                 words, remedy = "unknown key", did_you_mean(name, list(units))
-                remedy += "; or a table for each effect" if effects else ""
+                remedy += "; or one table for each effect" if effects else ""
                 wrong.append(toml.finding(words, remedy, key))
                 continue
             for parameter, (stated, place) in entries.items():
@@ -263,8 +263,8 @@ def read_material(source: Path, file: str) -> dict[str, Prior]:
     facts = read_priors(source, MATERIAL_UNITS, file)
     lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
     if lacking:
-        words = "the material says nothing of " + " and ".join(lacking)
-        remedy = 'Write a table for each, such as [poisson] family = "fixed"'
+        words = "the material file lacks " + " and ".join(lacking)
+        remedy = 'Add a table for each, such as [poisson] family = "fixed"'
         raise InputError([Finding(file, words, remedy)])
     ratio = facts["poisson"]
     if ratio.family != "fixed" or not ratio.numbers[0] < 0.5:

@@ -24,15 +24,15 @@ _NO_NAME = re.compile(r'[\\/:?"<>|]+')
 _NEARBY = f"the gear file is the {GEAR_NAME} next to the data"
 # The note where no gear file was named, and none lies next to the data.
 UNSIZED = (
-    f"{ASSUMED}without a gear file the part is a spring: the result is its stiffness, "
-    "and no K. K needs the sizes in a gear file, which is named or is the file "
-    f"{GEAR_NAME} next to the data"
+    f"{ASSUMED}without a gear file the part is treated as a spring: the result is its "
+    "stiffness, without K. For K state the sizes in a gear file: the file "
+    f"{GEAR_NAME} in the folder of the data, or one that is named"
 )
 
 _WARMTH = (
     f"{ASSUMED}without a gear file the stiffness is stated at the mean temperature of "
-    "the readings, {:g} °C. For another one write it into a gear file: "
-    "reference_temperature_C"
+    "the readings, {:g} °C. For another temperature state reference_temperature_C "
+    "in a gear file"
 )
 
 
@@ -156,10 +156,10 @@ def _defaults(gear: Gear) -> Iterator[str]:
     if "deformation" not in gear.source.get("measurement", {}):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
-            "twice as large, state that in the gear file"
+            "twice as large, state it in the gear file"
         )
     if "material" not in gear.source.get("gear", {}):
         yield (
-            f"{ASSUMED}the gear is of steel. If not, which changes K and the influence "
-            "of the temperature, name its material in the gear file"
+            f"{ASSUMED}the gear is of steel. If not, state its material in the gear "
+            "file: it changes K and the influence of the temperature"
         )

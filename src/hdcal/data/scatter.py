@@ -24,10 +24,11 @@ def require_scatter(case: Case) -> None:
         return
     if np.max(np.abs(left_of_lines(records, force))) > _NOTHING * np.max(np.abs(force)):
         return
-    words = "the scatter of the readings cannot be estimated: each run lies on a "
-    words += "straight line to the last digit"
-    remedy = "To readings that were computed, add noise; of a display, state the step "
-    remedy += "as force_resolution_N under [measurement] of the gear file"
+    words = "the scatter of the readings cannot be estimated: each run lies exactly on "
+    words += "a straight line"
+    remedy = "If the readings are rounded, state the step of the display as "
+    remedy += "force_resolution_N in [measurement] of the gear file; add noise to "
+    remedy += "simulated readings"
     raise InputError([Finding(case.name, words, remedy)])
 
 

@@ -161,7 +161,7 @@ def unit_powers(unit: str) -> tuple[int, ...]:
 def _product(unit: str) -> tuple[float, tuple[int, ...]]:
     """Return the scale of a product of units, and its powers of the code units."""
     if len(unit) > _LONGEST:
-        raise UnitError("the unit is longer than any unit can be")
+        raise UnitError("the unit is too long")
     factor, powers, sign = 1.0, _NONE, 1
     text = unit.replace(" ", "").replace("·", "*")
     # "**" is a power, a single "*" or "/" joins factors
@@ -173,7 +173,7 @@ def _product(unit: str) -> tuple[float, tuple[int, ...]]:
         factor *= scale**sign
         powers = tuple(p + sign * q for p, q in zip(powers, its_powers, strict=True))
     if not (0.0 < factor < math.inf):
-        raise UnitError(f"'{unit}' is not a usable scale")
+        raise UnitError(f"'{unit}' is too large or too small")
     return factor, powers
 
 

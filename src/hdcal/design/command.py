@@ -51,12 +51,14 @@ def _open(console: Console, run, out, force, kind: str) -> Any:
     help="Set the standard deviation of the set point [mm].",
 )
 @click.option(
-    "--limit-force", type=FORCE, help="Design sizes that keep the force below this [N]."
+    "--limit-force",
+    type=FORCE,
+    help="Find sizes that keep the force below this limit [N].",
 )
 @click.option(
     "--limit-stress",
     type=STRESS,
-    help="Keep the stress below this [MPa] [default: the yield strength].",
+    help="Keep the stress below this limit [MPa] [default: the yield strength].",
 )
 @click.option(
     "--deformation",
@@ -73,10 +75,12 @@ def _open(console: Console, run, out, force, kind: str) -> Any:
     "--temperature",
     "temperatures",
     type=Parsed("LO:HI", read_window),
-    help="Require it at these temperatures [°C] [default: the reference temperature].",
+    help="Keep the limits at these temperatures [°C] [default: the reference].",
 )
 @click.option(
-    "--probability", default=0.99, help="Require this probability [default: 0.99]."
+    "--probability",
+    default=0.99,
+    help="Keep the limits with this probability [default: 0.99].",
 )
 @options.tolerance_option
 @options.seed_option
@@ -86,9 +90,9 @@ def _open(console: Console, run, out, force, kind: str) -> Any:
 def design(console: Console, run, out, force, **given):
     """Design from RUN, a folder of `hdcal calibrate` or `hdcal diagnose`.
 
-    --window designs the softest spring of an elastic wave generator that keeps the
-    gear between backlash, at the end nearer to zero, and jamming, at the other end.
-    --limit-force designs the sizes nearest to the tested ones that keep the limit.
+    --window finds the softest spring of an elastic wave generator that keeps the
+    deformation within the window: below it there is backlash, above it the gear jams.
+    --limit-force finds the sizes nearest to the tested ones that keep the limit.
     """
     from hdcal.design.inverse_design import inverse_design
     from hdcal.design.wave_generator import wave_generator
@@ -97,8 +101,8 @@ def design(console: Console, run, out, force, **given):
     unused = _OF_LIMIT if window else _OF_WINDOW
     with console.wrong as wrong:
         if window == limit:
-            words = "both ask at once" if window else "nothing is asked"
-            remedy = "Say either --window LO:HI or --limit-force N"
+            words = "both are given" if window else "neither is given"
+            remedy = "Give either --window LO:HI or --limit-force N"
             wrong.append(Finding("--window and --limit-force", words, remedy))
         mode = "--window" if window else "--limit-force"
         wrong += [] if window == limit else options.without_meaning(unused, mode)
@@ -114,8 +118,8 @@ def design(console: Console, run, out, force, **given):
     "--vary",
     metavar="NAME=VALUES",
     read=partial(read_named, read=read_grid, known=lambda: AXES),
-    help="Vary wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45. May be repeated. "
-    "Also length_mm, load_height_mm, deformation_mm, temperature_C.",
+    help="Vary this quantity: wall_thickness_mm=0.6:0.76:5, radius_mm=35,40,45. Also "
+    "length_mm, load_height_mm, deformation_mm, temperature_C. May be repeated.",
 )
 @click.option(
     "--deformation",
@@ -140,8 +144,8 @@ def study(console: Console, run, out, force, **asked):
 
     with console.wrong as wrong:
         if not options.is_given("vary"):
-            remedy = "Say --vary wall_thickness_mm=0.6:0.76:5"
-            wrong.append(Finding("vary", "nothing is varied", remedy))
+            remedy = "Give for example --vary wall_thickness_mm=0.6:0.76:5"
+            wrong.append(Finding("vary", "no size is varied", remedy))
         models = _open(console, run, out, force, "study")
     found = run_study(models, **asked)
     tables = {"study.csv": found.to_frame()}

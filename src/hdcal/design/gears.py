@@ -134,8 +134,10 @@ def calibrated_gears(models: Models, seed: int = 0) -> Gears:
         raise InputError(wrong)
     model = joint(models)
     if model.posterior.theory == SPRING:
-        words = "has no sizes, and a design changes sizes"
-        remedy = "Calibrate with the sizes of the gear and another theory"
+        words = "has no sizes, which a design needs"
+        remedy = (
+            "Calibrate with the sizes of the gear in a gear file and another theory"
+        )
         raise InputError([Finding(f"theory '{SPRING}'", words, remedy)])
     notes = *averaging_words(models), *noise_warnings(model.posterior)
     return Gears(model, seed, notes)

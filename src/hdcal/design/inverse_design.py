@@ -58,7 +58,7 @@ class LimitAsked(request.Asked):
             return limit
         usual = abs(np.median(gears.forces([at], [gears.gear.reference_temperature])))
         if limit < 0.0 < at or not usual / _OFF <= abs(limit) <= usual * _OFF:
-            words = f"{limit:g} N is no limit where {at:g} mm takes about "
+            words = f"{limit:g} N is not plausible: {at:g} mm needs about "
             words += f"{digits(usual, 3)} N"
             raise fault(words, "Give it in N, with the sign of the deformation")
         return abs(limit)
@@ -67,7 +67,7 @@ class LimitAsked(request.Asked):
     @classmethod
     def _check_bounds(cls, bounds: dict, info: ValidationInfo) -> dict:
         if not bounds:
-            raise fault("nothing may change", "Free a size: wall_thickness_mm=0.5:0.8")
+            raise fault("no size is varied", "Vary a size: wall_thickness_mm=0.5:0.8")
         at = info.data.get("deformation_mm", 0.0)
         request.check_sizes(request.gears_of(info), bounds, at)
         return bounds
@@ -252,7 +252,7 @@ def inverse_design(
 
 def _unmet(best: Candidate, asked: LimitAsked) -> Finding:
     at = ", ".join(f"{name} {value:.4g}" for name, value in best.sizes.items())
-    words = f"nothing keeps {asked.limit_force_N:g} N: {at} gives "
+    words = f"no design keeps {asked.limit_force_N:g} N: the best, {at}, needs "
     words += f"{digits(best.force_kept_N, 4)} N at {best.stress_MPa.median:.3g} MPa"
-    remedy = "Widen the bounds, free another size, or allow more force or stress"
+    remedy = "Widen the bounds, vary another size, or allow more force or stress"
     return Finding("limit_force", words, remedy)

@@ -28,8 +28,8 @@ def _nominal(given: Any, info: ValidationInfo) -> Any:
     if given is not None:
         return given
     if nominal is None:
-        words = "the gear file names no nominal deformation"
-        raise fault(words, "Give one in mm, such as 0.4")
+        words = "the gear file states no nominal deformation"
+        raise fault(words, "Give a deformation in mm, such as 0.4")
     # The gear file states it as read.
     return nominal * gears_of(info).radial_per_read
 
@@ -101,17 +101,19 @@ def check_sizes(gears: Gears, sizes: Mapping[Any, Any], deformation: Any) -> Non
     """Require sizes [mm], by name, that are possible in every combination."""
     for name in sizes:
         if not matters(SIZES[name], gears.gear.geometry, gears.theory):
-            words = f"{name} changes nothing under the theory '{gears.theory}'"
+            words = f"{name} has no influence under the theory '{gears.theory}'"
             raise fault(words, "Leave it out, or use the theory cup")
     least, most = (
         {name: float(end(sizes.get(name, gears.size_of(name)))) for name in SIZES}
         for end in (np.min, np.max)
     )
     if most["wall_thickness_mm"] >= least["radius_mm"]:
-        raise fault("a wall that is not thinner than the radius", "Check both sizes")
+        raise fault(
+            "the wall thickness is not less than the radius", "Check both sizes"
+        )
     if "load_height_mm" in sizes and most["load_height_mm"] > least["length_mm"]:
-        words = "a load beyond the length of the gear"
-        raise fault(words, "Measure the load height from the closed base")
+        words = "the load acts beyond the length of the gear"
+        raise fault(words, "State the load height from the closed base")
     if np.max(np.abs(deformation)) >= least["radius_mm"]:
         words = f"the deformation reaches the radius of {least['radius_mm']:g} mm"
-        raise fault(words, "Give it in mm")
+        raise fault(words, "Give the deformation in mm")

@@ -109,8 +109,9 @@ def study(
     axes = {name: np.ravel(axes[name]).tolist() for name in (*vary, *axes)}
     count = prod(map(len, axes.values()))
     if not 1 <= count <= MOST_DESIGNS:
-        words = f"{count} designs are not between 1 and {MOST_DESIGNS}"
-        raise InputError([Finding("vary", words, "Vary less, or in fewer steps")])
+        words = f"{count} designs; 1 to {MOST_DESIGNS} are possible"
+        remedy = "Vary fewer sizes, or use fewer steps"
+        raise InputError([Finding("vary", words, remedy)])
     asked = requested(
         StudyAsked,
         gears,

@@ -53,7 +53,7 @@ class WindowAsked(Asked):
     def _check_window(cls, window: Ends, info: ValidationInfo) -> Ends:
         if window[0] <= 0.0 <= window[1]:
             words = f"{window[0]:g}:{window[1]:g} contains zero"
-            raise fault(words, "Give both ends one sign, e.g. 0.38:0.42")
+            raise fault(words, "Give both ends the same sign, such as 0.38:0.42")
         check_sizes(gears_of(info), {}, window)
         return window
 
@@ -241,7 +241,7 @@ def _require_growing(forces: np.ndarray) -> None:
     share = float(np.mean(np.all(np.diff(forces, axis=0) > 0.0, axis=(0, 1))))
     if share < 1.0:
         words = f"in {1.0 - share:.2g} of the draws the force does not grow with "
-        words += "deformation inside the window, so that a spring may snap through"
+        words += "deformation inside the window, so that the gear may snap through"
         remedy = "Give a window in the tested range, or calibrate without the effect"
         raise InputError([Finding("window", words, remedy)])
 
@@ -249,7 +249,12 @@ def _require_growing(forces: np.ndarray) -> None:
 def _unmet(springs: Sequence[Spring], required: float) -> Finding:
     best, (soft, *_, stiff) = max(springs, key=lambda each: each.probability), springs
     low, high, at = (digits(each.rate_N_per_mm, 4) for each in (soft, stiff, best))
-    words = f"no spring rate between {low} and {high} N/mm keeps it with probability "
+    words = (
+        f"no spring rate between {low} and {high} N/mm keeps the window with "
+        "probability "
+    )
     words += f"{required:g}: the best is {at} N/mm with {best.probability:.4g}"
-    remedy = "Widen the window, narrow the temperatures or build the set point closer"
+    remedy = (
+        "Widen the window, or reduce the temperature range or the set-point scatter"
+    )
     return Finding("window", words, remedy)

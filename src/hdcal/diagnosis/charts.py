@@ -67,7 +67,7 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
         x=displacement_axis(case),
         y=load_axis(case.units, "measured − model"),
         marks=[Rule(at=0.0), *bands, *points, *lines],
-        title=f"{case.name}: what the straight model leaves",
+        title=f"{case.name}: residuals of the straight model",
         wide=True,
         height=4.0,
         legend_beside=True,
@@ -106,7 +106,7 @@ def which_chart(which: Which) -> Chart:
     shown = [c for c in which.causes if c.probability >= _LEAST][:_MOST]
     named = {either(cause.members): cause.probability for cause in shown}
     named["outside the library"] = which.outside.probability
-    return _ranked("probability that it acts", named)
+    return _ranked("probability that the effect acts", named)
 
 
 def _ranked(axis: str, named: dict[str, float]) -> Chart:
@@ -130,4 +130,4 @@ def _ranked(axis: str, named: dict[str, float]) -> Chart:
 def ladder_chart(far: "HowFar", units: Quantities) -> Chart:
     """Return what each model leaves, from the straight model to the noise."""
     rungs = {rung.model: rung.rms_N for rung in far.ladder if rung.model != FORMULA}
-    return _ranked(load_axis(units, "root mean square of what is left"), rungs)
+    return _ranked(load_axis(units, "root mean square of the residuals"), rungs)

@@ -19,14 +19,16 @@ from hdcal.cli.options import (
 @click.argument("cases", metavar="CASE...", nargs=-1, required=True)
 @library_option
 @click.option(
-    "--quick", is_flag=True, help="Skip sampling; the result then gives no margins."
+    "--quick",
+    is_flag=True,
+    help="Skip sampling; the result cannot be used by predict or margin.",
 )
 @click.option("--no-report", is_flag=True, help="Write no figures and no report.")
 @click.option(
     "--jobs",
     default=1,
     show_default=True,
-    help="Diagnose many cases in so many processes.",
+    help="Set the number of processes for many cases.",
 )
 @seed_option
 @click.option(

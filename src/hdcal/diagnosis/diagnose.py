@@ -115,8 +115,8 @@ def _check(case: Case, effects: Mapping[str, type[Effect]], seed: int) -> None:
     if deformation @ np.asarray(case.records.force) > 0.0:
         return
     units = case.units
-    words = f"the {units.load} does not grow with the {units.displacement}"
-    remedy = "check the signs of both columns and that the load cell was connected"
+    words = f"the {units.load} does not increase with the {units.displacement}"
+    remedy = "Check the signs of both columns and the connection of the load cell"
     raise InputError([Finding(case.name, words, remedy)])
 
 
@@ -194,7 +194,7 @@ def _how_far(
             model = f"+ {words}" if name else "calibrated straight model"
             ladder.append(Rung(model=model, rms_N=size))
     wild = fit.noise.name == OUTLIERS
-    noise = "noise without wild readings" if wild else "noise"
+    noise = "noise without outliers" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
     return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
 

@@ -19,8 +19,8 @@ def choose_library(spec: str | None = None) -> dict[str, type[Effect]]:
     if spec is None:
         return dict(EFFECTS)
     if not spec.startswith(_MINUS):
-        words = f"'{spec}' is not understood"
-        raise InputError([Finding("library", words, "use minus:NAME")])
+        words = f"'{spec}' is not a choice of effects"
+        raise InputError([Finding("library", words, "Write minus:NAME")])
     names = [name.strip() for name in spec.removeprefix(_MINUS).split(",")]
     check_names(names, EFFECTS, "library")
     return {name: effect for name, effect in EFFECTS.items() if name not in names}
@@ -40,7 +40,7 @@ def library_of(given: Mapping[str, type[Effect]] | None) -> dict[str, type[Effec
     ):
         return dict(given)
     words, remedy = (
-        "is no mapping of classes of effects",
-        "Give hdcal.EFFECTS or a part",
+        "is not a mapping of effect classes",
+        "Give hdcal.EFFECTS or a part of it",
     )
     raise InputError([Finding("library", words, remedy)])

@@ -63,8 +63,8 @@ def read_cases(paths: Sequence[str], **reading) -> tuple[list[Case], Refused]:
             # Some file systems do not distinguish capitals.
             name = case.name.casefold()
             if len(paths) > 1 and name in (*found, MARKER, REFUSED):
-                words = f"its result '{name}' would have the name of another file"
-                remedy = "Rename it, or diagnose it alone"
+                words = f"the name '{name}' of its result is already used"
+                remedy = "Rename the case, or diagnose it separately"
                 raise InputError([Finding(path, words, remedy)])
             found[name] = case
         except Exception as error:

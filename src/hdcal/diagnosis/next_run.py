@@ -71,17 +71,25 @@ def candidate_runs(
         yield run("load and unload four times faster", 1.5, loop, pace / 4.0)
         yield run("load and unload ten times slower", 4.0, loop, 10.0 * pace)
     if timed and "holds" not in known:
-        yield run("load, then hold the top for a minute", 2.0, paths["hold"])
+        yield run(
+            "load, then hold the largest {displacement} for one minute",
+            2.0,
+            paths["hold"],
+        )
     if np.ptp(warmth) <= _SAME:
         words = f"load and unload at {other:.0f} °C"
         yield run(words, 6.0, loop, temperature=other)
     elif abs(first - last) > _SAME:
-        words = f"go back to the first temperature, {first:.0f} °C, and load again"
+        words = f"return to the first temperature, {first:.0f} °C, and load again"
         yield run(words, 6.0, loop, temperature=first)
     words = "re-seat the gear and load again in finer steps at small {displacement}s"
     yield run(words, 2.0, paths["fine"])
-    yield run("small loops between half and 0.7 of the top", 1.5, paths["inner"])
-    yield run("load to 1.25 of the tested {displacement}", 5.0, paths["beyond"])
+    yield run(
+        "small cycles between 0.5 and 0.7 of the largest {displacement}",
+        1.5,
+        paths["inner"],
+    )
+    yield run("load to 1.25 times the largest {displacement}", 5.0, paths["beyond"])
     if np.ptp(records.angle) < np.pi / 2.0:
         angle = float(records.angle[-1]) + np.pi / 2.0
         yield run("turn the gear by 90° and load again", 2.0, paths["up"], angle=angle)

@@ -91,13 +91,13 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
     side, depth = np.sign(x) if both else np.ones_like(x), np.abs(x)
     # Through zero a curve swings to both sides; its size is that of one.
     place, share = "deformation", 0.5 if both else 1.0
-    words = "the curve {way} with the {displacement}, {size} off a straight line"
+    words = "the curve {way} with the {displacement}, by {size} from a straight line"
     bend = side * depth**2
     yield Contrast(place, bend, ("stiffens", "softens"), words, share=share)
-    words = "at small {displacement}s the {load} lies {size} too {way}"
+    words = "at small {displacement}s the {load} is {size} too {way}"
     toe = side * np.maximum(_TOE - depth, 0.0)
     yield Contrast(place, toe, ("high", "low"), words, False, share)
-    words = "at the largest {displacement}s the {load} turns {way} by {size}"
+    words = "at the largest {displacement}s the curve turns {way} by {size}"
     head = side * np.maximum(depth - _HEAD, 0.0)
     yield Contrast(place, head, _UP, words, False, share)
 
@@ -110,13 +110,13 @@ def _over_direction(
     down, than = "on unloading", "on loading"
     if both:
         down, than = "while the {displacement} decreases", "while it increases"
-    words = f"the {{load}} lies {{size}} {{way}} {down} than {than}"
+    words = f"the {{load}} is {{size}} {{way}} {down} than {than}"
     cells = loop_cells(records, _REACHES) if "unloading" in records.known else []
     for column in (sense, *cells):
         yield Contrast("direction", column, ways, words, False)
     words = (
-        f"the larger the {{displacement}}, the {{way}} the {{load}} lies {down} than "
-        f"{than}, by {{size}} over the range"
+        f"the {{load}} {down} is {{way}} than {than}, increasingly with the "
+        f"{{displacement}}, by {{size}} over the range"
     )
     yield Contrast("direction", sense * np.abs(x), ways, words, False)
 
@@ -124,7 +124,7 @@ def _over_direction(
 def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
     # With one speed in both directions the rate is the direction.
     if "rates" in records.known:
-        words = "a faster movement takes {way} {load}, by {size} over the speeds tested"
+        words = "a faster movement needs {way} {load}, by {size} over the tested speeds"
         yield Contrast("rate", np.asarray(records.rate), ("more", "less"), words)
     # A place that was read twice, as where the movement turns, was not held.
     if "holds" in records.known:
@@ -138,8 +138,8 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
     padded = padded_records(records)
     cycle = jit(load_cycle)(padded.sense, padded.run, padded.specimen)
     cycle = np.asarray(cycle)[: len(x)]
-    words = "the slope {way} from cycle to cycle, which moves the {load} by {size} "
-    yield Contrast("order", (cycle - cycle.mean()) * x, _RISES, words + "in all")
+    words = "the slope {way} from cycle to cycle, which changes the {load} by {size} "
+    yield Contrast("order", (cycle - cycle.mean()) * x, _RISES, words + "in total")
 
 
 def _held(records: Records) -> np.ndarray:
@@ -155,18 +155,18 @@ def _over_temperature(
     records: Records, x: np.ndarray, *, known_alpha: bool
 ) -> Iterator[Contrast]:
     warm, place = np.asarray(records.temperature), "temperature"
-    words = "the zero {way} with temperature, by {size} over the range tested"
+    words = "the zero {way} with temperature, by {size} over the tested range"
     yield Contrast(place, warm, _RISES, words)
-    beyond = " beyond the material's own" if known_alpha else ""
+    beyond = " more than the modulus" if known_alpha else ""
     words = f"the slope {{way}} with temperature{beyond}, "
-    words += "which moves the {load} by {size}"
+    words += "which changes the {load} by {size}"
     yield Contrast(place, (warm - warm.mean()) * x, _RISES, words)
 
 
 def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contrast]:
     for turns, often in ((1, "once"), (2, "twice")):
-        words = f"the stiffness goes with the angle, {often} a turn, "
-        words += "which moves the {load} by {size}"
+        words = f"the stiffness varies with the angle, {often} per turn, "
+        words += "which changes the {load} by {size}"
         for wave in (np.cos, np.sin):
             column = wave(turns * np.asarray(records.angle)) * x
             yield Contrast("angle", column, ("", ""), words)
@@ -177,7 +177,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
         yield Contrast("run", later, _UP, words + runs[k], False)
     for k in range(len(gears) if 1 < len(gears) <= _MOST_MEMBERS else 0):
         words = f"gear {gears[k]} is {{way}} than the others, "
-        words += "which moves its {load} by {size}"
+        words += "which changes its {load} by {size}"
         column = (np.asarray(records.specimen) == k) * x
         yield Contrast("specimen", column, ("stiffer", "softer"), words)
 

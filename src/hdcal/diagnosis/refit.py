@@ -47,7 +47,7 @@ def rows_to_calibrate(case: Case) -> Case:
     if rows <= _MOST_ROWS:
         return case
     few = thin_rows(case, -(-rows // _MOST_ROWS), turns=True)
-    words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
+    words = f"{len(few.records.force)} of {rows} rows were used for calibration"
     return replace(few, notes=(*few.notes, words))
 
 

@@ -18,7 +18,7 @@ MATTERS = 2.5e-4
 _MOST = 3
 _WORDS = {
     GROWING: "noise that grows with the load",
-    OUTLIERS: "wild readings",
+    OUTLIERS: "outliers",
     "coulomb_friction": "Coulomb friction",
 }
 ON_NOISE = (GROWING, OUTLIERS)
@@ -41,7 +41,7 @@ def either(members: Sequence[str]) -> str:
     words = [*map(effect_words, members)]
     if len(words) > _MOST:
         others = len(words) - _MOST + 1
-        words = [*words[: _MOST - 1], f"one of {others} others"]
+        words = [*words[: _MOST - 1], f"one of {others} other effects"]
     *first, last = words
     return f"{', '.join(first)} or {last}" if first else last
 

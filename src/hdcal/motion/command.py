@@ -17,7 +17,7 @@ from hdcal.errors import Finding
     "--force",
     required=True,
     metavar="F.csv|step",
-    help="Apply this force: a table with time_s and force_N, or a step.",
+    help="Apply this force: a table with time_s and force_N, or the word step.",
 )
 @column_option
 @click.option(
@@ -32,7 +32,7 @@ from hdcal.errors import Finding
 @click.option(
     "--temperature",
     type=float,
-    help="Set the temperature of the gear [°C] [default: the tested one].",
+    help="Set the temperature of the gear [°C] [default: the tested temperature].",
 )
 @click.option(
     "--mass-kg",
@@ -44,16 +44,16 @@ from hdcal.errors import Finding
     "--damping", type=float, help="Set the damping c [N·s/mm] [default: its prior]."
 )
 @click.option(
-    "--points", default=1001, show_default=True, help="Predict at so many times."
+    "--points", default=1001, show_default=True, help="Set the number of times."
 )
 @click.option(
-    "--draws", default=500, show_default=True, help="Integrate so many draws."
+    "--draws", default=500, show_default=True, help="Set the number of draws."
 )
 @seed_option
 @click.option(
     "--out", metavar="DIR", help="Write the result to DIR [default: RUN-response]."
 )
-@click.option("--replace", is_flag=True, help="Replace an older result.")
+@click.option("--replace", is_flag=True, help="Replace an older result of hdcal.")
 @json_option
 @click.pass_obj
 def respond(console: Console, run, force, columns, out, replace, **asked):
@@ -73,7 +73,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
         if force != STEP:
             drive = wrong.attempt(read_force, force, columns or {})
             if asked["amplitude"] is not None:
-                words = "a sampled force has its own"
+                words = "is for a step only; the table states the force"
                 wrong.append(Finding("amplitude", words, "Leave it out"))
     assert drive is not None
     if asked["mass"] is not None:

@@ -102,17 +102,18 @@ def _check_record(case: Case) -> None:
             wrong.append(Finding(case.name, problem, remedy))
 
         if "time" not in records.known:
-            find("no column holds the time", "A moving gear needs one, such as time_s")
+            find("no column contains the time", "Add a column such as time_s")
         elif len(case.run_labels) > 1 or len(case.specimen_labels) > 1:
-            find("holds several runs or gears", "Calibrate one run of one gear")
+            find("contains several runs or gears", "Calibrate one run of one gear")
         elif late.size:
-            words = f"reading {late[0] + 2} is not later than the one before"
-            find(words, "Give each reading its time")
+            words = f"reading {late[0] + 2} is not later than the previous one"
+            find(words, "State the time of each reading")
         if rows < FEWEST_ROWS:
-            find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
+            words = f"contains {rows} rows of readings"
+            find(words, f"At least {FEWEST_ROWS} are needed")
         if np.any(records.force_sd > 0.0):
-            remedy = "The force is taken as exact: leave it out"
-            find("gives an sd of the force", remedy)
+            remedy = "The force is assumed to be exact: leave force_sd out"
+            find("states an sd of the force", remedy)
 
 
 def _specifics(problem: DynamicProblem, sampled: Draws, rival: Check) -> dict[str, Any]:
@@ -159,8 +160,10 @@ def whiteness_check(problem: DynamicProblem, values) -> Check:
     p = chdtrc(len(lags), rows * (rows + 2) * np.sum(share**2 / (rows - lags)))
     if p >= _LEAST_P:
         return Check(_WHITE, "passed", f"no correlation over rows (p = {p:.2g})")
-    words = f"residuals are correlated from row to row (p = {p:.1g}): the model does "
-    return Check(_WHITE, "warning", words + "not hold, the intervals are too narrow")
+    words = f"residuals are correlated from row to row (p = {p:.1g}): the model is "
+    return Check(
+        _WHITE, "warning", words + "incomplete, and the intervals are too narrow"
+    )
 
 
 def _rate_check(problem: DynamicProblem, values) -> Check:
@@ -169,7 +172,7 @@ def _rate_check(problem: DynamicProblem, values) -> Check:
     words = f"{1.0 / np.median(steps):.1f} rows per period"
     if np.median(steps) * _LEAST_PER_PERIOD <= 1.0:
         return Check(_RATE, "passed", words)
-    remedy = "the force between rows is taken as straight; sample faster"
+    remedy = "too few, as the force is interpolated linearly; sample faster"
     return Check(_RATE, "warning", f"{words}: {remedy}")
 
 
@@ -181,7 +184,7 @@ class DynamicCalibration(PosteriorResult):
     format: Literal["hdcal.dynamic-calibration/3"] = "hdcal.dynamic-calibration/3"
     parameters: dict[str, ParameterEstimate] = Field(json_schema_extra={**_REQUIRED})
     natural_frequency_Hz: Interval = quantity("natural frequency", "Hz")
-    damped_frequency_Hz: Interval = quantity("frequency with damping", "Hz")
+    damped_frequency_Hz: Interval = quantity("damped natural frequency", "Hz")
     damping_ratio: Interval = quantity("damping ratio ζ")
     damping_N_s_per_mm: Interval = quantity("damping c", "N·s/mm")
     bands: pd.DataFrame = Field(exclude=True)

@@ -86,16 +86,17 @@ def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
     if "mass" in gear.dynamic_priors:
         return gear.dynamic_priors["mass"]
     if gear.theory == SPRING:
-        words = "the theory 'spring' has no sizes from which the mass follows"
-        raise InputError([Finding(gear.name, words, "Add mass to its [priors]")])
+        words = "the theory 'spring' has no sizes to compute the moved mass from"
+        remedy = "Add mass to [priors] of the gear file"
+        raise InputError([Finding(gear.name, words, remedy)])
     if gear.density is None or "mass_ratio" not in gear.dynamic_priors:
-        words = "the material has no density, from which the moved mass follows"
-        remedy = "Add [density] to the material, or mass to the gear file's [priors]"
+        words = "the material file has no density to compute the moved mass from"
+        remedy = "Add [density] to the material, or mass to [priors] of the gear file"
         raise InputError([Finding(gear.material, words, remedy)])
     read = {"radial_per_read": radial_per_read}
     ring = float(_ring_mass(gear.geometry, gear.density, **read))
     prior = scaled(gear.dynamic_priors["mass_ratio"], ring)
-    source = f"{1e3 * ring:.3g} kg move on a bare ring; {prior.source}"
+    source = f"moved mass of a bare ring: {1e3 * ring:.3g} kg; {prior.source}"
     return Prior(prior.family, prior.numbers, "N*s^2/mm", source)
 
 
@@ -182,8 +183,8 @@ class DynamicPosterior(Posterior):
     @cached_property
     def problem(self) -> Problem:
         """Raise `InputError`, as there is no model of the force as read."""
-        words = "this is a calibration of the moving gear, without a force offset"
-        remedy = "Take one of the gear at rest, or ask how the gear responds"
+        words = "is a dynamic calibration, which has no model of the static force"
+        remedy = "Use a static calibration, or `hdcal respond`"
         raise InputError([Finding(self.case.name, words, remedy)])
 
     @cached_property

@@ -84,12 +84,12 @@ def integrate_all(
         ends.append(end)
     peak, done, gone = map(np.concatenate, zip(*ends, strict=True))
     if gone.any():
-        words = f"{np.count_nonzero(gone)} of {count} gears give way under this force"
-        remedy = "ask for a smaller amplitude, or measure that far, pulled and pushed"
-        raise NotUsable(f"{words}, up to {case.gear.reach:g} mm: {remedy}")
+        words = f"the deformation of {np.count_nonzero(gone)} of {count} draws exceeds"
+        remedy = "use a smaller amplitude, or test larger deformations of both signs"
+        raise NotUsable(f"{words} {case.gear.reach:g} mm: {remedy}")
     if not done.all():
         words = f"{np.count_nonzero(~done)} of {count} motions could not be integrated"
-        raise NotUsable(f"{words}: ask for a shorter duration")
+        raise NotUsable(f"{words}: use a shorter duration")
     return motion, peak
 
 

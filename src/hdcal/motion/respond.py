@@ -145,7 +145,7 @@ def _given_findings(given, dynamic: bool) -> Iterator[Finding]:
     for name, value in given.items():
         yield from implausible(name, value)
         if dynamic and value is not None:
-            words = "this calibration of the moving gear determines it"
+            words = "is determined by the dynamic calibration"
             yield Finding(name, words, "Leave it out")
 
 
@@ -157,21 +157,21 @@ def _force_findings(
         yield from implausible("amplitude", amplitude)
         yield from implausible("duration", duration)
         if amplitude == 0.0:
-            yield Finding("amplitude", "0 drives nothing", "Give a force in N")
+            yield Finding("amplitude", "is 0", "Give a force in N")
         if force != STEP:
             words = f"'{force}' is not a known force"
             yield Finding("force", words, f"Use {STEP} or a table")
         return
     if duration is not None:
-        words = "a sampled force has its own duration"
+        words = "is for a step only; the table states the times"
         yield Finding("duration", words, "Leave it out")
     times, forces, words = *(np.asarray(part, float) for part in force), ""
     if times.shape != forces.shape or times.ndim != 1 or len(times) < 2:
-        words = "needs as many times as forces, two or more"
+        words = "needs the same number of times and forces, two or more"
     elif wrong := implausible("force", forces) + implausible("force", times, "time"):
-        words = f"the table holds {wrong[0].problem}"
+        words = f"the table contains {wrong[0].problem}"
     elif np.any(np.diff(times) <= 0.0):
-        words = "has times that do not rise"
+        words = "has times that do not increase"
     elif not np.any(forces):
         words = "is zero throughout"
     if words:
@@ -202,13 +202,13 @@ def _check_reach(reach: float, drive: Forcing, times, m, k) -> None:
     with Findings() as wrong:
         static = float(drive.largest) / np.median(k)
         if static >= reach:
-            words = f"would deform the gear by {static:.3g} mm even at rest"
+            words = f"would deform the gear by {static:.3g} mm even statically"
             wrong.append(Finding("force", words, "Give the force in N"))
         seconds = float(np.ptp(times))
         swings = seconds * float(np.max(natural_frequency(m, k)))
         if swings > _MOST_SWINGS:
-            words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
-            remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
+            words = f"{seconds:g} s are up to {swings:.2g} periods of the vibration"
+            remedy = f"Use at most {_MOST_SWINGS:g} periods, and give times in s"
             wrong.append(Finding("duration", words, remedy))
 
 

@@ -29,7 +29,7 @@ class Estimates(Item):
     """Quantities of the gear without effects, and its peak deformation."""
 
     natural_frequency_Hz: Estimate = quantity("natural frequency", "Hz")
-    damped_frequency_Hz: Estimate = quantity("frequency with damping", "Hz")
+    damped_frequency_Hz: Estimate = quantity("damped natural frequency", "Hz")
     damping_ratio: Estimate = quantity("damping ratio ζ")
     damping_N_s_per_mm: Estimate = quantity("damping c", "N·s/mm")
     mass_kg: Estimate = quantity("moved mass m", "kg")

@@ -118,13 +118,13 @@ def widest(problem: Problem) -> Population:
 def population_findings(asked: str, problem: Problem) -> list[Finding]:
     """Return why the data cannot describe a population; empty where they can."""
     if asked not in POPULATIONS:
-        words = f"'{asked}' is unknown"
+        words = f"'{asked}' is not a population"
         return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
     counts = {"mountings": problem.runs, "specimens": problem.specimens}
     if counts.get(asked, 2) >= 2:
         return []
-    words = f"the data hold one of the {asked}, which does not show how others differ"
-    remedy = f"Measure two or more, or ask about {widest(problem)}"
+    words = f"the data contain only one of the {asked}, so their scatter is unknown"
+    remedy = f"Measure two or more, or choose {widest(problem)}"
     return [Finding("population", words, remedy)]
 
 
@@ -169,26 +169,28 @@ def far_findings(
     """
     if abs(deformation) < reach and abs(deformation) <= tested * OFF:
         return []
-    words = f"{deformation:g} {unit}, where the readings reach to {tested:g} {unit}"
-    return [Finding("deformation", words, f"Give it in {unit}")]
+    words = (
+        f"{deformation:g} {unit} is far beyond the readings, up to {tested:g} {unit}"
+    )
+    return [Finding("deformation", words, f"Give the deformation in {unit}")]
 
 
 def excluded_findings(case: Case, deformation: float, sense: float) -> list[Finding]:
     """Return a finding where rows were left out: at a deformation, or in a sense."""
     if case.excluded_sense and sense == case.excluded_sense:
-        way = "rises" if sense > 0.0 else "falls"
-        words = f"readings while the {case.units.displacement} {way} were left out, as "
-        words += "the stiffness is that of one branch"
-        remedy = "Ask for the other direction, or calibrate with the range all"
+        way = "increases" if sense > 0.0 else "decreases"
+        words = "the calibration left out the readings where the "
+        words += f"{case.units.displacement} {way}"
+        remedy = "Choose the other direction, or calibrate with the range all"
         return [Finding("direction", words, remedy)]
     if not any(low < deformation < high for low, high in case.excluded):
         return []
     tested, unit = np.asarray(case.records.deformation), case.units.displacement_unit
     words = (
-        f"{deformation:g} {unit} is outside the part of the curve that was calibrated, "
+        f"{deformation:g} {unit} is outside the calibrated part of the curve, "
         f"{tested.min():.4g} to {tested.max():.4g} {unit}; readings there were left out"
     )
-    remedy = "Calibrate with the range all to include them, or ask inside this part"
+    remedy = "Choose a deformation inside, or calibrate with the range all"
     return [Finding("deformation", words, remedy)]
 
 
@@ -200,8 +202,8 @@ def temperature_findings(
         return wrong
     rise = np.max(np.abs(temperature - gear.reference_temperature))
     if np.median(values["alpha"]) * rise >= _MOST_LOSS:
-        words = "the linear law E(T) would change Young's modulus by half or more"
-        return [Finding("temperature", words, "Give it in °C")]
+        words = "Young's modulus would change by half or more at this temperature"
+        return [Finding("temperature", words, "Give the temperature in °C")]
     return []
 
 
@@ -216,8 +218,10 @@ def share_findings(
     for name, share in shares.items():
         if name == "confidence" and share > most:
             words = f"{draws} draws cannot resolve a confidence of {share:g}"
-            findings.append(Finding(name, words, f"Ask for {most:.4g} or less{more}"))
+            findings.append(Finding(name, words, f"Give {most:.4g} or less{more}"))
         elif name != "confidence" and share > 1.0 - RAREST:
-            words = f"{share:.12g} is beyond what a model of the scatter can promise"
-            findings.append(Finding(name, words, f"Ask for {1.0 - RAREST:g} or less"))
+            words = (
+                f"{share:.12g} is too high to be supported by the model of the scatter"
+            )
+            findings.append(Finding(name, words, f"Give {1.0 - RAREST:g} or less"))
     return findings

@@ -102,13 +102,13 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
     if isinstance(models, list | tuple):
         if all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in models):
             return models
-        words, remedy = "are no pairs", "Give [(0.6, posterior), (0.4, other)]"
+        words, remedy = "are not pairs", "Give [(0.6, posterior), (0.4, other)]"
         raise InputError([Finding("models", words, remedy)])
     if held := getattr(models, "posteriors", None):
         return list(held.values())
-    words = f"{type(models).__name__} is no calibrated model"
-    words += ", and a quick diagnosis holds none"
-    remedy = "Give a calibration, or a diagnosis that was not quick"
+    words = f"{type(models).__name__} is not a calibrated model; a quick diagnosis "
+    words += "contains none"
+    remedy = "Give a calibration, or a diagnosis without `quick`"
     # A fleet, or its posterior.
     if hasattr(models, "margin"):
         remedy = "Use its method `margin`"
@@ -127,10 +127,10 @@ def models_of(models: Models, *, allow_failed: bool = False) -> tuple[Model, ...
     pairs = model_pairs(models)
     total = sum(share for share, _ in pairs)
     if not total > 0.0 or any(share < 0.0 for share, _ in pairs):
-        words, remedy = "hold no probability", "Give (probability, posterior) pairs"
+        words, remedy = "have no probability", "Give (probability, posterior) pairs"
         raise InputError([Finding("models", words, remedy)])
     if len({posterior.case.data_sha256 for _, posterior in pairs}) > 1:
-        words, remedy = "are not of the same data", "Give models of one case"
+        words, remedy = "are of different data", "Give models of the same data"
         raise InputError([Finding("models", words, remedy)])
     if not allow_failed:
         for _, posterior in pairs:
@@ -159,11 +159,13 @@ def averaging_words(models: Models) -> list[str]:
     if len(every) > 1:
         shares = probabilities(every).items()
         listed = ", ".join(f"{hypothesis(n)} ({percent(p)})" for n, p in shares)
-        sentences.append(f"This averages over the causes that are left: {listed}.")
+        sentences.append(
+            f"The result is an average over the possible causes: {listed}."
+        )
     missing: LeftOut | None = getattr(models, "left_out", None)
     if missing is not None and missing.probability > _ROUNDING:
-        words = f"{percent(missing.probability)} of the probability lies on hypotheses "
-        words += "that were not calibrated; it counts as "
+        words = f"{percent(missing.probability)} of the probability belongs to "
+        words += "hypotheses that were not calibrated; it is assigned to "
         sentences.append(f"{words}{hypothesis(missing.counted_as)}.")
     return sentences
 

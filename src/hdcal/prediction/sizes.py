@@ -35,15 +35,17 @@ def check_tolerances(
 
     for name, size in tolerances.items():
         if name not in SIZES:
-            find(f"'{name}'", "is no size with a tolerance", f"Use {', '.join(SIZES)}")
+            find(f"'{name}'", "is not a size", f"Use {', '.join(SIZES)}")
             continue
         nominal = float(getattr(geometry, SIZES[name]))
         if wrong := implausible("tolerances", size):
-            find(name, f"= {wrong[0].problem}", "Give the ± part, in mm")
+            find(name, f"= {wrong[0].problem}", "Give the value after ±, in mm")
         elif size > _LARGEST * nominal:
-            find(name, f"= {size:g} on a size of {nominal:g} mm", "Give it in mm")
+            find(
+                name, f"= {size:g} mm is too large for {nominal:g} mm", "Check the unit"
+            )
         elif not matters(SIZES[name], geometry, theory):
-            words = f"does not enter the theory '{theory}'"
+            words = f"has no influence under the theory '{theory}'"
             other = "the sizes of the gear" if theory == SPRING else "the theory cup"
             find(name, words, f"Leave it out, or calibrate with {other}")
     return findings

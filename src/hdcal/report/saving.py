@@ -101,17 +101,19 @@ class Target:
         if not os.path.lexists(self.path):
             return None
         if not self.force:
-            return f"exists already; `{self.option}` would replace a result of hdcal"
+            return f"exists already; `{self.option}` replaces an older result of hdcal"
         if (start := self.beginning) is not None:
             known = self.path.is_file() and self.path.read_bytes().startswith(start)
-            return None if known else "is not a file that hdcal wrote"
+            return None if known else "was not written by hdcal"
         try:
             files = dict(json.loads((self.path / MARKER).read_text("utf-8"))["files"])
         except (OSError, ValueError, LookupError, TypeError):
             return f"is not a result of hdcal: it has no valid {MARKER}"
         for name, content in _contents(self.path).items():
             if files.get(name) != content and name != MARKER:
-                return f"holds '{name}', which hdcal did not write or which was edited"
+                return (
+                    f"contains '{name}', which hdcal did not write or which was edited"
+                )
         return None
 
     def _refusal(self, problem: str) -> InputError:

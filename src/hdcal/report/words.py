@@ -18,11 +18,11 @@ _PARAMETERS: dict[str, tuple[str, str, float]] = {
     "force_gain": ("gain of the {load} gauge", "%", 100.0),
     "deformation_gain": ("gain of the displacement gauge", "%", 100.0),
     "temperature_offset": ("offset of the thermometer", "K", 1.0),
-    "run_offset_sd": ("spread of zeros between runs", "N", 1.0),
-    "specimen_sd": ("spread of stiffness between gears", "1", 1.0),
+    "run_offset_sd": ("sd of zeros between runs", "N", 1.0),
+    "specimen_sd": ("relative sd of stiffness between gears", "1", 1.0),
     "noise_correlation": ("correlation of neighbouring readings", "1", 1.0),
-    "gap_sd": ("size of the leftover discrepancy", "N", 1.0),
-    "gap_length": ("length of the leftover discrepancy", "1", 1.0),
+    "gap_sd": ("size of the discrepancy", "N", 1.0),
+    "gap_length": ("relative length scale of the discrepancy", "1", 1.0),
     "mass": ("moved mass m", "kg", 1e3),
     "damping_ratio": ("damping ratio ζ", "1", 1.0),
     "initial_deformation": ("{displacement} at the first row", "mm", 1.0),
@@ -31,11 +31,11 @@ _PARAMETERS: dict[str, tuple[str, str, float]] = {
 }
 UNITS = {name: (unit, factor) for name, (_, unit, factor) in _PARAMETERS.items()}
 _FAMILY_WORDS = {
-    "fixed": "exactly {0}",
-    "normal": "{0} ± {1}",
-    "lognormal": "{0}, a factor of {1} either way",
-    "half_normal": "0 to about {0}",
-    "uniform": "anything from {0} to {1}",
+    "fixed": "exactly {0}{unit}",
+    "normal": "{0} ± {1}{unit} (1 sd)",
+    "lognormal": "{0}{unit}, times or divided by {1} (1 sd)",
+    "half_normal": "half-normal, {0}{unit} (1 sd)",
+    "uniform": "uniform from {0} to {1}{unit}",
     "beta": "beta({0}, {1})",
 }
 # Numbers of the families that have no unit.
@@ -90,8 +90,8 @@ def prior_words(name: str, prior: Prior, units: Quantities = FORCE) -> str:
         plain = float(value) * (1.0 if part in _DIMENSIONLESS else factor)
         log = part == "log_sd"
         texts.append(f"{math.exp(plain):.3g}" if log else f"{plain:.4g}")
-    words = _FAMILY_WORDS[prior.family].format(*texts)
-    return f"{words} {unit(units.unit(shown))}".rstrip()
+    after = f" {unit(units.unit(shown))}".rstrip()
+    return _FAMILY_WORDS[prior.family].format(*texts, unit=after)
 
 
 def label(name: str, theory: str = "", units: Quantities = FORCE) -> str:

@@ -8,40 +8,43 @@ from hdcal.quantities import Quantities
 from hdcal.screening.result import Kind, Observation
 
 _LISTED = 4  # stretches of rows that one sentence names
-_ZERO = "the rows from there on are moved back by it, as a run with another zero"
+_ZERO = "later rows are shifted back by it and form a run with its own zero"
 _CUT = "{count} left out ({rows}): "
 _SENTENCES: dict[Kind, str] = {
     "before the tare": "{count} at the beginning left out ({rows}): read before the "
-    "tare, {size} {unit} from where the record goes on",
+    "tare, {size} {unit} from the readings after it",
     "jump of the force": "the zero of the {load} jumps by {signed} {unit} at {rows}: "
     + _ZERO,
     "jump of the deformation": "the zero of the {displacement} jumps by {signed} "
     "{unit} at {rows}: " + _ZERO,
     "jump of both": "{load} and {displacement} jump at {rows}, the {load} by {signed} "
     "{unit}: " + _ZERO,
-    "wild reading": _CUT + "wild readings, up to {size} {unit} from the curve of their "
-    "neighbours",
+    "wild reading": _CUT + "outliers, up to {size} {unit} from the curve through the "
+    "neighbouring rows",
     "opposite sign": "the {load} falls as the {displacement} grows, by {size} {N/mm}, "
-    "on every branch: one of the two is counted with the opposite sign. The sign of "
-    "the {load} is turned",
+    "on every branch: one of the two has the opposite sign. The sign of the {load} "
+    "is reversed",
     "negative slope": "the {load} falls as the {displacement} grows, by {size} {N/mm} "
-    "in the mean, but not all along: no stiffness follows from it",
-    "saturation of the force": _CUT + "the {load} stands at its limit of {signed} "
-    "{unit} while the {displacement} goes on",
-    "saturation of the deformation": _CUT + "the {displacement} stands at its limit of "
-    "{signed} {unit} while the {load} goes on",
+    "on average, but not everywhere: a stiffness cannot be determined",
+    "saturation of the force": _CUT + "the {load} stays at its limit of {signed} "
+    "{unit} while the {displacement} changes",
+    "saturation of the deformation": _CUT + "the {displacement} stays at its limit of "
+    "{signed} {unit} while the {load} changes",
     "scatter of the deformation": "the reading of the {displacement} scatters by "
-    "{size} {unit} (sd), which the {load} does not follow: each row is moved along the "
-    "line to the {displacement} smoothed over the rows",
-    "after the largest force": _CUT + "the {load} has dropped by {size} {unit} for "
-    "good while the {displacement} goes on",
-    "repeated reading": "{count} left out: each reading stands in {size} rows, as the "
-    "logger is faster than the gauges",
+    "{size} {unit} (sd), which the {load} does not follow: each row is shifted along "
+    "the "
+    "line to the smoothed {displacement}",
+    "after the largest force": _CUT + "the {load} drops permanently by {size} "
+    "{unit} while the {displacement} increases further",
+    "repeated reading": "{count} left out: each reading is repeated in {size} rows, "
+    "because "
+    "the logger is faster than the gauges",
     "outside the range": "{count} left out: outside the working range of {range}",
 }
 _CHOOSE = (
-    "Check which columns are {load} and {displacement}, and their signs; or choose the "
-    "part that is meant by `range`"
+    "Check which columns are {load} and {displacement}, and their signs; or choose a "
+    "part "
+    "of the curve by `range`"
 )
 HIDDEN = (
     "the scatter of the {displacement} hides the direction of its movement: loading "

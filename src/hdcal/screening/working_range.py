@@ -20,8 +20,8 @@ from hdcal.screening.run import Run
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
 FORM = (
-    "Write it like 0.1:0.6 in mm (an angle: rad), or 10%:40% of the largest force; "
-    "or straight, for the longest straight part; or all"
+    "Write it like 0.1:0.6 in mm (angles in rad), like 10%:40% of the largest force, "
+    "straight for the longest straight part, or all"
 )
 STRAIGHT = "straight"
 
@@ -66,9 +66,9 @@ def read_range(text: str) -> WorkingRange:
     except ValueError:
         low = high = math.inf
     if found is None or not (math.isfinite(low) and math.isfinite(high)):
-        raise ValueError(f"'{text}' is no range")
+        raise ValueError(f"'{text}' is not a range")
     if bool(found[2]) != bool(found[4]):
-        raise ValueError(f"'{text}' is in % at one end only")
+        raise ValueError(f"'{text}' has % at one end only")
     unit = "%" if found[2] else "mm"
     if not low < high:
         raise ValueError(f"the lower end of '{text}' is not below the upper one")

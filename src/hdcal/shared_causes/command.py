@@ -22,7 +22,7 @@ from hdcal.cli.options import (
     "--jobs",
     default=1,
     show_default=True,
-    help="Diagnose the gears in so many processes.",
+    help="Set the number of processes.",
 )
 @skip_bad_option
 @seed_option

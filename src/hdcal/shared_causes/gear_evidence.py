@@ -43,7 +43,7 @@ def weigh_gear(
         return error.findings[0]
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         remedy = "Leave the gear out, or diagnose it alone"
-        return Finding(gear.name, f"its evidence failed ({error})", remedy)
+        return Finding(gear.name, f"its evidence cannot be computed ({error})", remedy)
     return weights
 
 

@@ -71,8 +71,10 @@ def without_bad(
         raise InputError([*bad.values(), offer(bad, len(gears))])
     if len(left) < _FEWEST:
         words = f"{len(left)} of {len(gears)} gears can be used"
-        remedy = f"Frequencies of causes take {_FEWEST} or more gears, each named in a "
-        remedy += "column specimen"
+        remedy = (
+            f"Frequencies of causes need {_FEWEST} or more gears, named in a column "
+        )
+        remedy += "specimen"
         raise InputError([*bad.values(), Finding("data", words, remedy)])
     return left
 
@@ -105,7 +107,7 @@ def _fault(gear: Case) -> Finding | None:
     needed = _FEWEST_LEFT + 1 + runs
     if rows < needed:
         words = f"has {rows} rows in {runs} run{'s' if runs > 1 else ''}, too few"
-        remedy = f"Read it {needed} times or more, or leave it out"
+        remedy = f"Take {needed} or more readings, or leave the gear out"
         return Finding(gear.name, words, remedy)
     read, force = np.asarray(gear.records.deformation), np.asarray(gear.records.force)
     units, run = gear.units, np.asarray(gear.records.run)

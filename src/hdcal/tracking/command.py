@@ -9,7 +9,7 @@ from hdcal.cli.console import Console, discard
 from hdcal.cli.options import json_option
 
 
-@command(short_help="Track readings as they arrive, with an alarm at a change.")
+@command(short_help="Track readings as they arrive, with an alarm after a change.")
 @click.argument("known", metavar="RUN")
 @click.option(
     "--alarm-rows",
@@ -25,7 +25,7 @@ def track(console: Console, known, alarm_rows):
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
     "force_N": 37.8}, optionally with temperature_C and run (a label of the mounting).
-    Each reading is answered at once by a line on standard output.
+    Each reading is answered at once by one line on standard output.
     """
     from hdcal.inference.model_average import load_models
     from hdcal.report.words import digits
@@ -35,9 +35,9 @@ def track(console: Console, known, alarm_rows):
     tracker, bad = Tracker(load_models(known), alarm_rows=alarm_rows), 0
     mean, half = tracker.stiffness
     words = (
-        f"starts at {digits(mean, 4)} ± {digits(half)} {tracker.units.stiffness_unit} "
-        f"(95 %) on a mounting that was not tested; one false alarm in {alarm_rows:g} "
-        "readings"
+        f"initial stiffness {digits(mean, 4)} ± {digits(half)} "
+        f"{tracker.units.stiffness_unit} (95 %), for a new mounting; on average one "
+        f"false alarm in {alarm_rows:g} readings"
     )
     console.words("\n".join([words, *tracker.notes]))
     try:
@@ -50,10 +50,12 @@ def track(console: Console, known, alarm_rows):
         discard(sys.stdout)
     due = tracker.readings / alarm_rows
     console.words(
-        f"{tracker.rows} rows, {bad} of them bad; {tracker.alarms} alarms, where "
-        f"{digits(due)} false ones are due without a change"
+        f"{tracker.rows} rows, {bad} of them not readable; {tracker.alarms} alarms; "
+        f"{digits(due)} false alarms are expected without a change"
     )
     if tracker.alarms:
-        words = "the answers remain those of the gear before a change, which raises "
-        console.words(f"{words}more alarms; after a change calibrate again")
+        words = (
+            "after a change the answers still refer to the gear before it, and alarms "
+        )
+        console.words(f"{words}are repeated: calibrate again")
     return 2 if bad else 0

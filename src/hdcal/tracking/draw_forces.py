@@ -108,15 +108,17 @@ def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
     for model in found:
         for effect in model.posterior.effects:
             if effect.mixture or effect.needs - {"temperature"}:
-                hidden[model.name] = f"a stream does not show its '{effect.name}'"
+                hidden[model.name] = (
+                    f"'{effect.name}' cannot be evaluated reading by reading"
+                )
     followed = [model for model in found if model.name not in hidden]
     if sum(model.probability for model in followed) < _LEAST_FOLLOWED:
-        remedy = "Calibrate without it, or diagnose blocks of rows"
+        remedy = "Calibrate without this effect, or diagnose blocks of rows"
         raise InputError(Finding("known", why, remedy) for why in hidden.values())
     notes = averaging_words(models)
     notes += [f"Model '{name}' is left out: {why}." for name, why in hidden.items()]
     if left := noise_warnings(followed[0].posterior):
-        notes += [*left, "This may cause alarms without a change."]
+        notes += [*left, "This may cause alarms without a change of the gear."]
     whole = join(followed)
     case, size, problem = whole.posterior.case, whole.size, whole.problem
     prior = followed[0].posterior.priors[MOUNTING]

@@ -51,7 +51,7 @@ def left_out(found: Screening, segments: Iterable[int] = _DRAWN) -> Iterator[Poi
     for segment in np.unique(found.segment[some]):
         these = some[found.segment[some] == segment]
         yield Points(
-            label=f"left out: {SEGMENTS[segment]}",
+            label=f"left out: {SEGMENTS[segment].replace('wild reading', 'outlier')}",
             x=found.deformation[these],
             y=found.force[these],
             colour=CYCLE[(segment + 1) % len(CYCLE)],

@@ -70,12 +70,12 @@ def init(console: Console, folder, data, columns, sheet, **stated):
     with console.wrong:
         if data is None and sheet is not None:
             raise InputError(
-                [Finding("--sheet", "is of a workbook", "Name its --data")]
+                [Finding("--sheet", "needs a workbook", "Give it with --data")]
             )
         if data is None:
             console.wrong.attempt(read_gear, tables)
         elif Path(data).is_dir():
-            raise InputError([Finding("data", "is a folder", "Name a file")])
+            raise InputError([Finding("data", "is a folder", "Give a file")])
         elif columns is not None:
             how = {"columns": columns, "sheet": sheet}
             case = console.wrong.attempt(read_case, data, tables, **how)
@@ -91,8 +91,10 @@ def init(console: Console, folder, data, columns, sheet, **stated):
     several = case is not None and len(case.specimen_labels) > 1
     next_step = f"hdcal {'fleet' if several else 'calibrate'} {folder} --out result"
     if data is None:
-        next_step = f"put your readings there as {DATA_NAME}, then {next_step}"
-    console.words(f"{', '.join(files)} written into {folder}. Next: {next_step}")
+        next_step = (
+            f"copy the readings to {DATA_NAME} in this folder, then run {next_step}"
+        )
+    console.words(f"{', '.join(files)} written to {folder}. Next: {next_step}")
     if console.json:
         console.data({"status": "ok", "folder": folder, "files": [*files]})
     return 0
@@ -101,7 +103,7 @@ def init(console: Console, folder, data, columns, sheet, **stated):
 def _write(folder: Path, files: dict[str, bytes]) -> None:
     """Write new files into a folder that may be there already."""
     if there := [name for name in files if (folder / name).exists()]:
-        words = f"holds {' and '.join(there)} already"
+        words = f"already contains {' and '.join(there)}"
         raise InputError([Finding(str(folder), words, "Name another folder")])
     try:
         folder.mkdir(exist_ok=True)

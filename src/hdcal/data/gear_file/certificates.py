@@ -40,7 +40,7 @@ class GaugeCertificate(BaseModel):
     @model_validator(mode="after")
     def _states_something(self) -> Self:
         if not self.stated:
-            remedy = f"Write one of {', '.join(self.SITES)}"
+            remedy = f"State one of {', '.join(self.SITES)}"
             raise fault("states no uncertainty", remedy)
         return self
 
@@ -94,5 +94,5 @@ def contact_as_read(contact: Prior, gauge: Prior) -> Prior:
         return contact
     middle, own = (*map(float, contact.numbers), 0.0)[:2]
     sd = math.hypot(own, float(gauge.numbers[1]))
-    source = f"{gauge.source}; and of the contact: {contact.source}"
+    source = f"{gauge.source}; contact: {contact.source}"
     return Prior("normal", (middle, sd), gauge.unit, source)

@@ -86,7 +86,7 @@ def tables_of(source: Mapping[Any, Any]) -> dict[str, Any]:
         if not isinstance(table, dict):
             continue  # refused by the schema
         if key in table:
-            words = f"is stated twice, alone and in the table [{name}]"
+            words = f"is stated twice, outside and inside the table [{name}]"
             raise InputError([Finding(key, words, "State it once")])
         table[key] = plain[key]
     return tables
@@ -111,7 +111,7 @@ def size_findings(toml: TomlFile) -> list[Finding]:
     if not isinstance(table, dict):
         return []
     needed = () if table.get("theory") == SPRING else SIZES_NEEDED
-    other = f"; or take the theory '{SPRING}', which needs none"
+    other = f"; or use theory = '{SPRING}', which needs no sizes"
     findings = [
         toml.finding("is missing", f"Add it: {name} = …{other}", f"gear.{name}")
         for name in needed
@@ -133,12 +133,12 @@ def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
     radius = size.get("radius", math.inf)
     both = "Check both sizes"
     faults = [
-        ("wall_thickness", "the wall is not thinner than the radius", both),
-        ("nominal_deformation", "the deformation is not below the radius", both),
+        ("wall_thickness", "the wall thickness is not less than the radius", both),
+        ("nominal_deformation", "the deformation is not less than the radius", both),
     ]
     faults = [fault for fault in faults if size.get(fault[0], 0.0) >= radius]
     if size.get("load_height", 0.0) > size.get("length", math.inf):
         words = "the load acts beyond the length of the gear"
-        remedy = "Measure the load height from the closed base"
+        remedy = "State the load height from the closed base"
         faults.append(("load_height", words, remedy))
     return faults

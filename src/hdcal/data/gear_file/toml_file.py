@@ -54,7 +54,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         nested = isinstance(error, RecursionError)
         message = "nested too deeply" if nested else str(error)
         place = _PLACE.search(message)
-        words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
+        words = f"is not valid TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
         findings.refuse(words, "Correct that line", row)
     return TomlFile(file, table)

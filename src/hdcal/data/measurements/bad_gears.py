@@ -30,9 +30,9 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
     """Return that bad gears can be left out; `many` counts all, where it is known."""
     verb = "is" if len(bad) == 1 else "are"
-    words = f"{len(bad)} of {many or 'the'} gears {verb} bad: "
+    words = f"{len(bad)} of {many or 'the'} gears {verb} faulty: "
     words += shortened([*map(quoted, bad)], _LISTED)
-    remedy = "Use it to leave these gears out and evaluate the others"
+    remedy = "Use this option to leave these gears out and evaluate the others"
     return Finding("skip_bad", words, remedy)
 
 

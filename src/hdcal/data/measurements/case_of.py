@@ -113,14 +113,14 @@ def _at_own_scale(gear: Gear, measured: Measurements, run: np.ndarray) -> Gear:
 def _require_torsion(gear: Gear, name: str) -> None:
     """Refuse a gear file on forces where torques were measured."""
     if gear.theory != SPRING:
-        words = f"torques over angles are no readings of the theory {gear.theory}"
-        remedy = "Leave the gear file out, or state the theory spring in it"
+        words = f"the theory {gear.theory} does not apply to torques over angles"
+        remedy = "Leave the gear file out, or state theory = 'spring' in it"
         raise InputError([Finding(name, words, remedy)])
     stated = [*gear.source.get("gear", {}), *gear.source.get("measurement", {})]
     wrong = [key for key in stated if key.endswith(("_N", "_mm")) or key in _OF_FORCE]
     if wrong := [*wrong, *({"priors", "rig"} & gear.source.keys())]:
-        words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
-        words += "and the readings are torques over angles"
+        words = f"the gear file states {', '.join(wrong)} for forces and deformations, "
+        words += "but the readings are torques over angles"
         raise InputError([Finding(name, words, "Leave these entries out")])
 
 

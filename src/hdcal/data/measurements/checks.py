@@ -24,12 +24,13 @@ def check_whole(
 ) -> None:
     """Find too few rows in a source, and a deformation that is constant."""
     if len(frame) < fewest:
-        words = f"holds {len(frame)} rows of readings"
+        words = f"contains {len(frame)} rows of readings"
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
         column = used["deformation"]
         words = f"the {column.quantity} is constant, which gives no stiffness"
-        findings.add(words, "Measure at several", None, column.header)
+        remedy = f"Measure at several {column.quantity}s"
+        findings.add(words, remedy, None, column.header)
 
 
 def is_constant(deformation: np.ndarray) -> bool:
@@ -61,7 +62,7 @@ def check_reach(
     radius = f"a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
     faults = (
-        (int(row), f"a deformation of '{far:g} mm' on {radius}", remedy)
+        (int(row), f"a deformation of '{far:g} mm' is impossible at {radius}", remedy)
         for row, far in beyond.items()
     )
     findings.add_rows(faults, column.header)

@@ -93,8 +93,8 @@ def read_gear_folder(
     common, notes = unsized(common, notes, np.concatenate([[], *warm]))
     whole = joined([part for part, _ in parts], common.reference_temperature, bad)
     kind = "folder" if cases else "file"
-    about = [f"each {kind} is a gear of that name, unless it has a column of gears"]
-    compared = f"the gear file, with sizes at which gears are compared, is {base}"
+    about = [f"each {kind} is one gear with its name, unless a column names the gears"]
+    compared = f"gears are compared at the sizes of the gear file {base}"
     about += [*([compared] if own else []), *not_read(files, folder)]
     about += _stated_by_some([part.stated for part, _ in parts])
     name = folder.resolve().name
@@ -105,8 +105,8 @@ def read_gear_folder(
 def _other_kind(one: Measurements, first: Measurements) -> Iterator[Finding]:
     """Yield a finding where one file holds torques and the other one forces."""
     if one.units != first.units:
-        words = f"holds {one.units.load}s, and {first.file} {first.units.load}s"
-        yield Finding(one.file, words, "Keep files of one kind in a folder")
+        words = f"contains {one.units.load}s, but {first.file} {first.units.load}s"
+        yield Finding(one.file, words, "Keep only files of one kind in a folder")
 
 
 def _unread(
@@ -130,8 +130,8 @@ def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Find
     for key in sorted({*mine, *theirs}):
         if mine.get(key) != theirs.get(key):
             here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
-            words = f"is {here}, and {there} in {base}"
-            remedy = "Gears of one kind differ in their sizes only"
+            words = f"is {here}, but {there} in {base}"
+            remedy = "Gears of a fleet may differ in their sizes only"
             yield Finding(str(file), words, remedy, None, key)
 
 
@@ -161,7 +161,7 @@ def _stated_by_some(stated: Sequence[frozenset[str]]) -> Iterator[str]:
     each = [names - {"specimen", "temperature", "run", *GROUPINGS} for names in stated]
     for name in sorted(frozenset().union(*each) - each[0].intersection(*each)):
         many = sum(name in names for names in each)
-        yield f"{name} is not read: {many} of {len(each)} files state it"
+        yield f"{name} is not used, because only {many} of {len(each)} files contain it"
 
 
 def labelled(measured: Measurements, label: str) -> Measurements:

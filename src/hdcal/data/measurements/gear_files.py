@@ -25,8 +25,8 @@ def gear_files(data: Any) -> list[Path]:
     if not isinstance(data, str | Path) or not os.path.isdir(data):
         return []
     if os.path.exists(Path(data) / MARKER):
-        words, remedy = "is a result of hdcal, not data", "Name the data; results are "
-        remedy += "read by predict, margin, respond, design, track and compare"
+        words, remedy = "is a result of hdcal, not data", "Name the data. Results are "
+        remedy += "read by predict, margin, respond, design, study, track and compare"
         raise InputError([Finding(str(data), words, remedy)])
     inside = sorted(one for one in Path(data).iterdir() if one.name[0] not in "._")
     if any(one.name == DATA_NAME for one in inside):
@@ -42,11 +42,11 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
     """Return the names of the gears, and whether each has a folder; or InputError."""
     cases = [file for file in files if file.parent != folder]
     if cases and len(cases) < len(files):
-        words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
-        remedy = f"Keep one of both; {files[-1].name} is such a file"
+        words = f"contains folders of gears, such as {cases[0].parent.name}, and files"
+        remedy = f"Keep folders or files only; {files[-1].name} is a file"
         raise InputError([Finding(str(folder), words, remedy)])
     labels = [(file.parent.name if cases else file.stem).strip() for file in files]
-    words, remedy = "is the name of several files", "Rename all but one"
+    words, remedy = "is the name of several gears", "Rename all but one file"
     if twice := [label for label, many in Counter(labels).items() if many > 1]:
         raise InputError(
             Finding(str(folder), f"{quoted(one)} {words}", remedy) for one in twice
@@ -63,9 +63,9 @@ def file_of_gear(data: Path, label: str | None) -> Path:
     if label in labels:
         file = files[labels.index(label)]
         return file.parent if cases else file
-    words = "holds a file for each gear, not one case"
-    words += "" if label is None else f"; none is called {quoted(label)}"
-    remedy = "Read all of them as a fleet, or name one as `specimen`"
+    words = "contains a file for each gear, not one case"
+    words += "" if label is None else f"; none is named {quoted(label)}"
+    remedy = "Use `hdcal fleet`, or select one gear with `specimen`"
     raise InputError([Finding(str(data), words, remedy)])
 
 
@@ -76,4 +76,4 @@ def not_read(files: Sequence[Path], folder: Path) -> Iterator[str]:
     others = [one for one in inside if one not in known and not one.startswith(".")]
     if others:
         names = shortened(others, _LISTED)
-        yield f"not read, as it is no table and no folder with a {DATA_NAME}: {names}"
+        yield f"not read, neither a table nor a folder with {DATA_NAME}: {names}"

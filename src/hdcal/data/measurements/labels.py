@@ -94,7 +94,10 @@ def _one_each(
     if (several := each["of"].duplicated()).any():
         word = "specimen" if quantity == "lot" else "run"
         name = quoted(names[each["of"][several].min()])
-        return (), f"{quantity}s are not used: {word} {name} has several"
+        return (
+            (),
+            f"the column {quantity} is not used: {word} {name} has several values",
+        )
     stated = dict(zip(each["of"], each["label"], strict=True))
     return tuple(stated.get(i, NOT_STATED) for i in range(len(names))), ""
 
@@ -113,7 +116,7 @@ def _dates(frame: pd.DataFrame, run: np.ndarray) -> tuple[tuple[str, ...], str]:
     times = pd.to_datetime(local, format="ISO8601", errors="coerce")
     wrong = times.isna() | ~stated.str.contains(_ISO)
     if wrong.any():
-        words = f"dates are not used: {quoted(stated[wrong].iloc[0])} cannot be read"
-        return (), f"{words}. Write dates as in 2026-09-01, year first"
+        words = f"dates are not used: {quoted(stated[wrong].iloc[0])} is not a date"
+        return (), f"{words}. Write dates as year-month-day, such as 2026-09-01"
     first = times.reindex(texts.index).groupby(run).min()
     return tuple("" if pd.isna(one) else one.isoformat() for one in first), ""

@@ -157,7 +157,7 @@ def _measured(
     values, notes = read_values(table, used, findings)
     if table.runs is not None and "run" not in used:
         values["run"] = np.char.mod("%d", table.runs + 1).astype(object)
-        notes.append("the readings below each row of headers are a run")
+        notes.append("the readings below each header row are one run")
     frame = pd.DataFrame(values, index=table.rows)
     if whole:
         check_whole(frame, used, findings)
@@ -188,10 +188,12 @@ def _with_time(
     if not back.any():
         return read
     label = quoted(names[index[int(np.argmax(back))]])
-    words = f"the time goes back within {f'run {label}' if len(names) > 1 else 'a run'}"
+    words = "the time decreases within "
+    words += f"run {label}" if len(names) > 1 else "a run"
     rows = read.frame.index[back].tolist()
     if not column.guessed:
-        remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
+        remedy = "Keep the order of measurement; label runs in a column 'run' if the "
+        remedy += "clock restarts"
         findings.add_rows(((row, words, remedy) for row in rows), column.header)
         return read
     note = f"{ASSUMED}{quoted(column.header)} is not used: {words}, at {row_list(rows)}"
@@ -208,17 +210,17 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     findings, (_, names) = FileFindings(measured.file), measured.gears
     name = quoted(label)
     if label not in names:
-        remedy = f"There are {shortened([*map(quoted, names)], _LISTED)}"
+        remedy = f"The specimens are {shortened([*map(quoted, names)], _LISTED)}"
         if len(names) == 1:
-            remedy = "Say `columns` 'specimen=HEADER', which names them"
+            remedy = "Name the column of the specimens: `columns` 'specimen=HEADER'"
         findings.refuse(f"no specimen is called {name}", remedy)
     one = measured.where((measured.frame["specimen"] == label).to_numpy())
     if len(one.frame) < FEWEST_ROWS:
         words = f"specimen {name} has {len(one.frame)} rows"
-        findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
+        findings.refuse(words, f"At least {FEWEST_ROWS} are needed")
     if is_constant(one["deformation"]):
         words = f"the {measured.units.displacement} of specimen {name} is constant"
-        findings.refuse(words, "Measure at several")
+        findings.refuse(words, "Measure at several deformations")
     if len(names) + len(measured.left_out) > 1:
         return replace(one, sha256=part_sha256(measured.sha256, label))
     return one
@@ -237,8 +239,8 @@ def read_force(
         check_whole(frame, used, findings, fewest=2)
         check_rows(frame, used, findings)
         if "time" in frame:
-            words = "the time is not later than that of the row before"
-            remedy = "Write a jump of the force as two rows a little apart"
+            words = "the time is not later than that of the previous row"
+            remedy = "Write a step of the force as two rows with different times"
             back = frame.index[1:][np.diff(frame["time"]) <= 0.0].tolist()
             findings.add_rows(((row, words, remedy) for row in back), "time")
     return frame["time"].to_numpy(), frame["force"].to_numpy()

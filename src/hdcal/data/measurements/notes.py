@@ -27,8 +27,8 @@ def source_notes(
     """Return what was assumed of a source, other notes, and what of it is not used."""
     notes = [f"{ASSUMED}{note}" for note in table.notes]
     notes += [
-        f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as was stated, "
-        f"though it names {column.against}"
+        f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as requested, "
+        f"although its header states {column.against}"
         for column in used.values()
         if column.against and column.unit is not None
     ]
@@ -53,7 +53,7 @@ def _likely(header: str, known: Container[str]) -> Iterator[str]:
     meant = parse_header(header)
     label = meant.quantity in LABELS
     if meant.quantity and meant.quantity not in known and (label or not meant.unit):
-        why = "differs from row to row" if label else "names no unit"
+        why = "differs from row to row" if label else "has no unit"
         option = f"'{meant.quantity}={header}{'' if label else '[UNIT]'}'"
         yield (
             f"{ASSUMED}{quoted(header)}, which may be the {meant.quantity}, is not "
@@ -74,17 +74,20 @@ def gear_notes(
     if gear.theory != SPRING and float(size.wall_thickness / size.radius) > _THIN:
         yield (
             f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
-            "is not thin, as the theories take it to be. Check both sizes, and units"
+            "is not thin, as the theories assume. Check both sizes and their units"
         )
     if step:
         off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
         if off:
-            yield f"{off} of {force.size} forces are not multiples of {step:g} N"
+            yield (
+                f"{off} of {force.size} forces are not multiples of the stated "
+                f"resolution of {step:g} N"
+            )
     low, high = _USUAL
     if temperature is not None and not low <= np.median(temperature) <= high:
         yield (
-            f"temperatures about {np.median(temperature):.4g} °C are far from those of "
-            "any rig. Check the unit of the column"
+            f"a median temperature of {np.median(temperature):.4g} °C is not "
+            "plausible. Check the unit of the column"
         )
 
 
@@ -93,9 +96,9 @@ def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator
     if motion.resets:
         few = shortened(rows[[*motion.resets]].tolist(), _MOST_ROWS)
         yield (
-            f"the {units.displacement} goes back over most of its range in one step "
-            f"(row {few}), which counts as no measured unloading. Where a new mounting "
-            "begins there, say so in a column `run`"
+            f"the {units.displacement} returns over most of its range in one step "
+            f"(row {few}), which does not count as measured unloading. If a new "
+            "mounting begins there, label it in a column `run`"
         )
 
 
@@ -105,8 +108,9 @@ def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[st
     if "run" not in stated and runs > gears and telling:
         yield (
             f"{ASSUMED}without a column `run`, rows of a gear that differ in "
-            f"{' or '.join(telling)} are of different mountings: {runs} mountings of "
-            f"{gears} gear{'s' if gears > 1 else ''}. If not, name the mountings in a "
+            f"{' or '.join(telling)} belong to different mountings: {runs} mountings "
+            f"of {gears} gear{'s' if gears > 1 else ''}. If not, label the mountings "
+            "in a "
             "column `run`"
         )
 
@@ -116,7 +120,8 @@ def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
     many = len({*rigs} - {NOT_STATED})
     if gears == 1 and many > 1:
         yield (
-            f"{many} rigs read this gear, and a calibration or a diagnosis takes "
-            "them for one: where their gains differ, the gear seems to change. Leave "
-            "the rows of one rig at a time, or use `hdcal fleet`"
+            f"this gear was measured on {many} rigs, which a calibration or a "
+            "diagnosis treats as one: a difference of their gains appears as a change "
+            "of the "
+            "gear. Give the rows of one rig at a time, or use `hdcal fleet`"
         )

@@ -88,8 +88,8 @@ def open_parquet(
         chosen = choose_columns(table, named, _USED, REQUIRED, findings)
         used = in_place_of_force(chosen)
         if "specimen" not in used:
-            remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-            findings.refuse("no column says which gear a row is of", remedy)
+            remedy = "Name the column of the gears: `columns` specimen=HEADER"
+            findings.refuse("no column names the gear of each row", remedy)
     return Parquet(
         name=path.resolve().name if root else path.stem,
         gear=common,

@@ -58,8 +58,8 @@ def screened(
         return screened(left, wanted, whole=whole)
     if wanted is not None:
         if wanted.unit == STRAIGHT and result.straight is None:
-            words = "is straight, and the data are of several runs, or of cycles "
-            words += "without straight movements"
+            words = "is straight, but the data contain several runs, or cycles without "
+            words += "straight movements"
             raise InputError([Finding("range", words, FORM)])
         result = in_range(result, wanted, run, units)
     reach, gears = result.working_range, measured["specimen"]
@@ -73,9 +73,9 @@ def screened(
         problem = f"{kept} of {run.size} rows are left"
         if wanted is not None and math.isfinite(wanted.high):
             problem += f" within {wanted.words(units)}"
-        remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
+        remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} ranges "
         ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
-        raise InputError([Finding(measured.file, problem, f"{remedy}read from {ends}")])
+        raise InputError([Finding(measured.file, problem, f"{remedy}from {ends}")])
     moved = {name: getattr(result, name) for name in ("deformation", "force", "zero")}
     left = measured.assign(**moved).where(result.kept)
     return _without_scatter(left, run[result.kept], result), result

@@ -85,7 +85,7 @@ class _OtherLines:
             words = words if line.counts else len(line.cells)
         if len(others) >= _FEWEST:
             problem = "a second table with other columns begins here"
-            remedy = "Split the file: one table each"
+            remedy = "Split the file into one file for each table"
             self.faults.append((others[0].row, problem, remedy))
         else:
             self._left += others
@@ -164,7 +164,7 @@ def find_table(grid: Grid, findings: FileFindings) -> ReadTable:
         clean[clean] = _are_readings(grid.take(clean), counted)
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
     words = "the columns differ from those of the first block"
-    remedy = "Name them alike, in the same order, or split the file"
+    remedy = "Use the same columns in the same order, or split the file"
     foreign = [other.row for other in headings if other.names != headings[0].names]
     findings.add_rows([*((row, words, remedy) for row in foreign), *others.faults])
     return _table(readings, headings, empty, others)
@@ -185,7 +185,7 @@ def _first_heading(
         others.sort(lines[others.above :])
         return Heading(tuple(str(i + 1) for i in range(width)))
     if not empty.issuperset(range(heading.cells, width)):
-        words = f"names {heading.cells} columns, and the readings below have {width}"
+        words = f"names {heading.cells} columns, but the readings below have {width}"
         findings.refuse(words, "Name every column", heading.row)
     above = {line.row for line in lines if line.row <= heading.last}
     others.above = len(above - {heading.row, heading.unit_row})
@@ -252,11 +252,14 @@ def _table(
     if others.above:
         names = ", ".join(f"'{name}'" for name in main.names)
         lines = "1 line" if others.above == 1 else f"{others.above} lines"
-        notes.append(f"{lines} above the table taken for titles. Its columns: {names}")
+        notes.append(f"{lines} above the table read as titles. The columns are {names}")
     if main.unit_row is not None and main.unit_row > main.row:
-        notes.append(f"row {main.unit_row} taken for the units of the columns")
+        notes.append(f"row {main.unit_row} read as the units of the columns")
     if len(headings) > 1:
-        notes.append(f"the headers stand {len(headings)} times. If not, split the file")
+        notes.append(
+            f"the header row is repeated {len(headings)} times. If these are different "
+            "tables, split the file"
+        )
     block = np.searchsorted([heading.last for heading in headings[1:]], grid.rows)
     runs = np.unique(block, return_inverse=True)[1]
     return ReadTable(

@@ -64,15 +64,15 @@ def read_number(cell: str, comma: bool) -> float:
     if comma and "." not in cell:
         point = cell.replace(",", ".")
     elif comma and "," not in cell and digits:
-        remedy = "Use one decimal sign in the whole file, and none for thousands"
+        remedy = "Use one decimal sign in the whole file, and no thousands separator"
         raise CellError(f"'{cell}' has a decimal point among decimal commas", remedy)
     if not _POINT.fullmatch(point):
         remedy = "Write the reading, or leave out the row if there is none"
         if digits:
-            remedy = "Write a plain number with a point, and no sign for thousands"
+            remedy = "Write the number with a decimal point and no thousands separator"
         raise CellError(f"'{cell}' is not a number", remedy)
     if math.isinf(number := float(point)):
-        raise CellError(f"'{cell}' is too large for a finite number", "Check the cell")
+        raise CellError(f"'{cell}' is too large", "Check the number")
     return number
 
 
@@ -158,7 +158,7 @@ def thousands(cells: list[str]) -> list[Fault]:
     pointed = [index for index, cell in enumerate(cells) if "." in cell]
     if len(pointed) == len(cells) or not all(map(_POINTED.fullmatch, cells)):
         return []
-    words = "may be a thousand, as no other number here has decimals"
+    words = "may be in thousands, as no other number in the column has decimals"
     return [
         (
             index,

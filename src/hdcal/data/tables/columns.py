@@ -63,9 +63,11 @@ def choose_columns(
         )
         others = ("deformation", "force", "force_sd") if turning else ("torque",)
         for name in filter(mapping.__contains__, others):
-            words = f"`columns` {name}=… is of another kind of test than "
+            words = f"`columns` {name}=… does not belong to a test of "
             words += "torque and angle" if turning else "force and deformation"
-            findings.add(words, "Name columns of one kind of test", table.header_row)
+            findings.add(
+                words, "Name the columns of one kind of test", table.header_row
+            )
         quantities = [name for name in quantities if name not in others]
         required = _TURNING if turning else required
     for quantity in quantities:
@@ -118,10 +120,10 @@ class _Chooser:
         places, option = places_named(wanted, headers), f"`columns` {quantity}="
         if len(places) != 1:
             near = get_close_matches(name, headers, 1, 0.4) or headers[:_SHOWN]
-            words = f"{option}{wanted} names a column that is not there"
+            words = f"{option}{wanted} names a column that does not exist"
             remedy = f"Use a header of the file: {', '.join(near)}"
             if places:
-                words = f"{option}{wanted} fits {len(places)} columns"
+                words = f"{option}{wanted} matches {len(places)} columns"
                 numbers = " or ".join(str(place + 1) for place in places)
                 remedy = f"Name it by its number, {numbers}"
             self._findings.add(words, remedy, self._table.header_row, name)
@@ -221,38 +223,38 @@ class _Chooser:
         numbers = ", ".join(str(place + 1) for place in places)
         words = f"the {quantity} may be {' or '.join(names)}"
         if len(places) == 1:
-            words = f"no header names the {quantity}, which {names[0]} may hold"
-        remedy = f"Say which, by its number ({numbers}): "
+            words = f"no header states the {quantity}; it may be {names[0]}"
+        remedy = f"Name the column by its number ({numbers}): "
         remedy += f"`columns` '{quantity}={places[0] + 1}'"
         self._add(words, remedy, places[min(1, len(places) - 1)])
 
     def _ask_unit(self, quantity: str, place: int) -> None:
         unit, text = self._headers[place].unit_text, self._table.headers[place]
-        words = f"may be the {quantity}, but the header names no unit"
+        words = f"may be the {quantity}, but the header states no unit"
         if unit:
             words = f"unknown unit {quoted(unit)} of the {quantity}"
         name = text.removesuffix(f"[{unit}]").rstrip()
         weight = weight_unit(unit) if quantity == "force" else ""
         option = f"`columns` '{quantity}={name}[{weight or 'UNIT'}]'"
-        self._add(words, f"Say {option}; {unit_advice(unit, quantity)}", place)
+        self._add(words, f"State {option}; {unit_advice(unit, quantity)}", place)
 
     def _refuse_missing(self, quantity: str) -> None:
         """Add that no column holds a quantity, with one that might."""
-        words, option = f"no column holds the {quantity}", f"`columns` '{quantity}="
+        words, option = f"no column contains the {quantity}", f"`columns` '{quantity}="
         headers = self._table.headers
         shown = ", ".join(quoted(header) for header in headers[:_SHOWN] if header)
-        remedy = f"Say {option}HEADER[UNIT]', HEADER one of: {shown}"
+        remedy = f"State {option}HEADER[UNIT]'; the headers are {shown}"
         for place, header in enumerate(self._headers):
             unit = header.unit_text if header.measures(quantity) else ""
             if unit and place in self._table.empty:
-                words += f"; {quoted(headers[place])} has no cells"
-                remedy = "Fill it in; of a workbook with formulas, save their values"
+                words += f"; {quoted(headers[place])} is empty"
+                remedy = "Fill in the column; in a workbook save formulas as values"
                 break
             if quantity == "force" and (weight := weight_unit(header.unit_text)):
                 words += f"; {headers[place]} is a mass"
                 unit = weight
             if unit:
-                remedy = f"If {quoted(headers[place])} does, say {option}"
+                remedy = f"If {quoted(headers[place])} is it, state {option}"
                 remedy += f"{place + 1}[{unit}]'"
                 break
         self._findings.add(words, remedy, self._table.header_row, quantity)
@@ -267,10 +269,12 @@ def _refuse_conflicts(
         other = owners.setdefault(column.position, quantity)
         if other != quantity:
             words = f"is used both as {other} and as {quantity}"
-            remedy = "Give each quantity another column"
+            remedy = "Name a different column for each quantity"
             findings.add(words, remedy, table.header_row, column.header)
         unit = table.conflicts.get(column.position)
         if unit and column.unit is not None and not column.against:
-            words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
+            words = (
+                f"{quoted(column.header)} states {column.unit.name}, but the row of "
+            )
             words += f"units {unit}"
-            findings.add(words, "Leave one of them out", table.unit_row)
+            findings.add(words, "Remove the wrong one", table.unit_row)

@@ -129,9 +129,9 @@ def memory_grid(data: Any, findings: FileFindings) -> tuple[Grid, str]:
         frame = pd.DataFrame(data)
     except (ValueError, TypeError) as error:
         remedy = "Give arrays of one length and one dimension, by name"
-        findings.refuse(f"is no table ({error})", remedy)
+        findings.refuse(f"is not a table ({error})", remedy)
     if frame.columns.nlevels > 1:
-        remedy = "Name each by one text, as in frame.columns.map('_'.join)"
+        remedy = "Give each column one name, as in frame.columns.map('_'.join)"
         findings.refuse("has columns of several levels", remedy)
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()

@@ -74,9 +74,9 @@ _MASSES = {"g": "gf", "kg": "kgf"}
 _EITHER = {"lb": "lbf", "lbs": "lbf", "oz": "ozf"}
 _TORQUES = {"lbin": "lbf*in", "inlb": "lbf*in", "lbft": "lbf*ft", "ftlb": "lbf*ft"}
 _ADVICE = {
-    "a mass; its weight is": _MASSES | {"t": "1000 kgf"},
-    "a mass or a force; as a force it is": _EITHER,
-    "a torque written without force; it is": _TORQUES,
+    "a mass; the unit of its weight is": _MASSES | {"t": "1000 kgf"},
+    "a mass or a force; the unit of force is": _EITHER,
+    "a mass times a length; the unit of torque is": _TORQUES,
 }
 
 
@@ -148,7 +148,7 @@ def unit_advice(text: str, quantity: str) -> str:
         if bare in forces:
             return f"{text} is {words} {forces[bare]}"
     if bare in ("V", "mV", "Volt", "Volts"):
-        return f"{text} is a raw signal: multiply it by its calibration first"
+        return f"{text} is a raw signal: convert it with its calibration first"
     hint = f" (did you mean {near[0]}?)" if near else ""
     return f"UNIT is one of: {', '.join(names)}{hint}"
 

@@ -12,13 +12,15 @@ def check_names(
 ) -> None:
     """Refuse a table without headers, and quantities that do not exist."""
     if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
-        words = f"no row of headers names the {len(table.headers)} columns: the first "
-        words += "row holds numbers where the headers should be"
-        remedy = "Say which column is which by its number, as in `columns` "
+        words = f"no header row names the {len(table.headers)} columns: the first row "
+        words += "contains numbers"
+        remedy = (
+            "Add a header row, or name the columns by their numbers, as in `columns` "
+        )
         remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
         findings.refuse(words, remedy, table.header_row)
     for quantity in (name for name in mapping if name not in QUANTITIES):
-        words = f"`columns` {quantity}=… names no quantity that hdcal knows"
+        words = f"`columns` {quantity}=… is not a known quantity"
         findings.add(words, did_you_mean(quantity, [*QUANTITIES]))
 
 

@@ -61,15 +61,16 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
         table = tables.dataset([*files], format="parquet", **split if keys else {})
         schemas = [one.physical_schema for one in table.get_fragments()]
     except Exception as error:  # whatever a parser makes of a broken file
-        words = f"is no Parquet file that can be read ({error})"
-        findings.refuse(words, "Save it anew")
+        words = f"is not a readable Parquet file ({error})"
+        findings.refuse(words, "Write the file again")
     schema = arrow.schema([])
     for name, one in zip([*files, root], [*schemas, kinds], strict=True):
         try:
             # A column that is empty in a file, or narrower, is no other kind.
             schema = arrow.unify_schemas([schema, one], promote_options="permissive")
         except arrow.ArrowTypeError as error:
-            findings.refuse(f"other columns in {name} ({error})", "Save it anew")
+            words = f"the columns of {name} have other types ({error})"
+            findings.refuse(words, "Write the file again")
     return table.replace_schema(schema)
 
 

@@ -93,10 +93,10 @@ def _file_table(
 ) -> tuple[ReadTable, str]:
     kind, notes, part = _kind(path), [], ""
     if kind and encoding is not None:
-        words = f"is {_KINDS[kind]}, which has no `encoding`"
-        findings.refuse(words, "Leave it out")
+        words = f"is {_KINDS[kind]}, which has no text encoding"
+        findings.refuse(words, "Leave out `encoding`")
     if kind != _WORKBOOK and sheet is not None:
-        findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
+        findings.refuse("is not a workbook and has no sheets", "Leave out `sheet`")
     if kind == _WORKBOOK:
         grid, notes, part = sheet_grid(path, findings, sheet)
     elif kind == PARQUET:
@@ -138,7 +138,7 @@ def table_of(grid: Grid, findings: FileFindings) -> ReadTable:
 
     def refuse(name: str, units: Sequence[str]) -> None:
         words = " and ".join(map(quoted, units))
-        problem = f"the unit of {quoted(name)} changes: {words}"
+        problem = f"the unit of {quoted(name)} changes between rows: {words}"
         findings.add(problem, "Convert the readings to one unit", table.header_row)
 
     for place, name in enumerate(headers[:-1]):
@@ -147,7 +147,7 @@ def table_of(grid: Grid, findings: FileFindings) -> ReadTable:
         units = [*filter(None, table.grid.labels(place + 1)[1])]
         if len(units) == 1 and find_unit(units[0]):
             headers[place] = f"{name} [{units[0]}]"
-            words = f"the unit of {quoted(name)} stands in the column behind it"
+            words = f"the unit of {quoted(name)} is in the column to its right"
             notes.append(f"{words}: {units[0]}")
         elif len(units) > 1 and any(map(find_unit, units)):
             refuse(name, units[:3])

@@ -39,7 +39,7 @@ def read_bytes(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
         findings.refuse("is a binary file", "Save it as UTF-8 text")
     for row, line in enumerate(raw.splitlines(), 1):
         if len(line) > _LONGEST_LINE:
-            words = "has a line of more than 1 MiB, so it is no table of readings"
+            words = "has a line of more than 1 MiB, so it is not a table of readings"
             findings.refuse(words, "Write one row of readings per line", row)
     return raw
 
@@ -52,22 +52,22 @@ def decode(
     try:
         text = raw.decode(likely)
     except LookupError:
-        remedy = "Name one that Python knows, such as cp1252 or gb18030"
+        remedy = "Give one that Python knows, such as cp1252 or gb18030"
         findings.refuse(f"the `encoding` '{encoding}' is unknown", remedy)
     except UnicodeError:
-        remedy = "Save it as UTF-8 text, or say its `encoding`"
-        findings.refuse(f"is broken {likely.upper()} text", remedy)
+        remedy = "Save it as UTF-8 text, or state its `encoding`"
+        findings.refuse(f"is not valid {likely.upper()} text", remedy)
     if "\0" in text:
         findings.refuse("is a binary file", "Save it as UTF-8 text")
     if _HTML.match(text[:1000]):
-        words = "is a web page (HTML), whatever its name says"
+        words = "is a web page (HTML), despite its file name"
         findings.refuse(words, "Open it in a spreadsheet, save it as .xlsx or CSV")
     text = text.removeprefix("\ufeff")
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     if encoding or likely in ("utf-8", "utf-16"):
         return text, []
-    return text, [f"the text is {likely}. If not, name it: --encoding NAME"]
+    return text, [f"the text encoding is {likely}. If not, state it: --encoding NAME"]
 
 
 def _likely(raw: bytes) -> str:

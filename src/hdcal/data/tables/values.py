@@ -63,10 +63,10 @@ def without_slow_channels(
         name, many = quoted(column.header), f"{(~filled).sum()} of {len(filled)} rows"
         if quantity in required:
             kept &= filled
-            notes.append(f"{name} is empty in {many}: these are left out")
+            notes.append(f"{name} is empty in {many}; these rows are left out")
         else:
             del left[quantity]
-            notes.append(f"{name} is not used, as it is empty in {many}")
+            notes.append(f"{name} is not used, because it is empty in {many}")
     return table if kept.all() else table.take(kept), left, notes
 
 
@@ -100,7 +100,7 @@ def _labels(
     empty = np.array([text == "" for text in texts], bool)[index]
     # As merged cells do; where most rows have a label, an empty one was forgotten.
     if len(index) and not empty[0] and 2 * empty.sum() > len(index):
-        words = "stands in the first row of each: the rows below it count as the same"
+        words = "is in the first row of each group only; it is used for the rows below"
         notes.append(f"the label of {quoted(column.header)} {words}")
         last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(index))))
         index, empty = index[last], np.zeros(len(index), bool)
@@ -108,7 +108,12 @@ def _labels(
     if not optional:
         words = f"the {column.quantity} label is empty"
         places = np.flatnonzero(empty).tolist()
-        _add(table, [(place, words, "Name it") for place in places], column, findings)
+        _add(
+            table,
+            [(place, words, "Fill in the label") for place in places],
+            column,
+            findings,
+        )
     blank = NOT_STATED if optional else ""
     return np.array([with_formula(text) or blank for text in texts], object)[index]
 

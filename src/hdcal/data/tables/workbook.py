@@ -31,14 +31,19 @@ def sheet_grid(
     if sheet is not None:
         return sheets[sheet], [], sheet if {*likely} - {sheet} else ""
     if not likely:
-        words = f"no sheet holds a table of readings: {names}"
-        remedy = f"Write at least {_FEWEST} rows of readings below headers; formulas "
-        remedy += "count when a spreadsheet program has computed and saved them"
+        words = f"no sheet contains a table of readings: {names}"
+        remedy = (
+            f"Write at least {_FEWEST} rows of readings below headers. Formulas are "
+            "read "
+        )
+        remedy += "only if a spreadsheet program has computed and saved their values"
         findings.refuse(words, remedy)
     if len(likely) > 1:
-        words = f"{len(likely)} sheets hold a table: {', '.join(map(quoted, likely))}"
-        findings.refuse(words, "Say which with `sheet`")
-    note = f"sheet {quoted(likely[0])} is read. If another is meant, name it"
+        words = (
+            f"{len(likely)} sheets contain a table: {', '.join(map(quoted, likely))}"
+        )
+        findings.refuse(words, "Select one with `sheet`")
+    note = f"sheet {quoted(likely[0])} is read. Select another one with `sheet`"
     return sheets[likely[0]], [note] if len(sheets) > 1 else [], ""
 
 
@@ -48,7 +53,7 @@ def _is_table(grid: Grid) -> bool:
 
 
 def _sheets(path: Path, findings: FileFindings) -> dict[str, Grid]:
-    broken = "is no workbook that can be read"
+    broken = "is not a readable workbook"
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(part.file_size for part in archive.infolist())
@@ -60,8 +65,8 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, Grid]:
         how: Any = {"sheet_name": None, "header": None, "na_filter": False}
         frames = pd.read_excel(path, engine="openpyxl", dtype=object, **how)
     except ImportError:
-        remedy = "Save it as CSV, or install what reads it: pip install openpyxl"
-        findings.refuse("is a workbook", remedy)
+        remedy = "Save it as CSV, or install openpyxl: pip install openpyxl"
+        findings.refuse("is a workbook, which needs openpyxl", remedy)
     except Exception:  # whatever a parser makes of a broken file
         findings.refuse(broken, "Save it as CSV")
     return {str(name): _grid(frame) for name, frame in frames.items()}

@@ -30,7 +30,10 @@ class HeteroscedasticNoise(Effect, stage="noise", family="noise"):
     """
 
     share: Scalar = parameter(
-        "1", "noise per force, beside the noise at no force", typical=0.007, null=0.0
+        "1",
+        "noise per force, in addition to the noise at no force",
+        typical=0.007,
+        null=0.0,
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Kind of a band, its label and its opacity; each lies on those before it.
 _BANDS = (
     ("new_measurement", "one new reading", 0.16),
-    ("with_gap", "with the leftover discrepancy", 0.22),
+    ("with_gap", "with the discrepancy", 0.22),
     ("physics", "mean {load}", 0.38),
 )
 _UNTESTED = "not tested: extrapolated"

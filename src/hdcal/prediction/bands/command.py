@@ -25,10 +25,13 @@ _COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
 @click.option(
     "--temperature",
     type=NUMBERS,
-    help="Predict at these temperatures [°C]: 20,60 [default: the reference].",
+    help="Predict at these temperatures [°C]: 20,60 [default: the reference "
+    "temperature].",
 )
 @direction_option(
-    "Predict for rising or falling deformation [default: loading].", default=None
+    "Predict for increasing (up) or decreasing (down) deformation [default: the "
+    "direction of loading].",
+    default=None,
 )
 @click.option(
     "--out",

@@ -85,8 +85,8 @@ def predict(
         wrong += temperature_findings(case.gear, model.draws, levels)
         wrong += implausible("interval", interval) + implausible("seed", seed)
         if direction not in (None, *DIRECTIONS):
-            words = f"'{direction}' is unknown"
-            wrong.append(Finding("direction", words, "use up or down"))
+            words = f"'{direction}' is not a direction"
+            wrong.append(Finding("direction", words, "Use up or down"))
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
     loading = _loading(at, case.records)
     sense = loading if direction is None else np.full(len(at), SENSE[direction])
@@ -158,7 +158,7 @@ def _numbers(name: str, given: Any) -> np.ndarray:
     except (TypeError, ValueError):
         numbers = np.empty((0, 0))
     if numbers.ndim != 1 or numbers.size == 0:
-        words, remedy = "is no list of numbers", "Give one or more"
+        words, remedy = "is not a list of numbers", "Give one number or more"
         raise InputError([Finding(name, words, remedy)])
     return numbers
 

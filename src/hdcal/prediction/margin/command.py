@@ -20,7 +20,7 @@ from hdcal.errors import Finding
     "--deformation",
     type=LENGTH,
     required=True,
-    help="Set the deformation as read [mm].",
+    help="Bound the force at this deformation, as read [mm].",
 )
 @click.option(
     "--limit-force",
@@ -43,13 +43,16 @@ from hdcal.errors import Finding
     help="Bound over -20:80 or at 20,60 [°C] [default: the tested temperature].",
 )
 @click.option(
-    "--content", default=0.99, help="Set the share of the population per bound."
+    "--content",
+    default=0.99,
+    help="Set the share of the population that keeps each bound.",
 )
 @click.option("--confidence", default=0.95, help="Set the confidence of each bound.")
 @click.option(
     "--population",
-    metavar="WHOSE",
-    help="Bound readings, mountings or specimens [default: the widest tested].",
+    metavar="NAME",
+    help="Bound readings, mountings or specimens (gears) [default: the widest "
+    "population that was tested].",
 )
 @click.option(
     "--quantity",
@@ -57,7 +60,7 @@ from hdcal.errors import Finding
     default="reading",
     help="Bound the reading of the gauge, or the load on the gear.",
 )
-@options.direction_option("Bound the force on loading or unloading.")
+@options.direction_option("Bound the force on loading (up) or unloading (down).")
 @options.tolerance_option
 @options.seed_option
 @options.folder_options("Write a result folder with a report to DIR.")
@@ -65,11 +68,11 @@ from hdcal.errors import Finding
 @click.option(
     "--certificate",
     is_flag=True,
-    help="Write a certificate to sign, one A4 page.",
+    help="Also write a certificate for signature, one A4 page; needs --out.",
 )
 @click.pass_obj
 def margin(console: Console, run, out, force, certificate, **asked):
-    """Bound the force at a deformation, from RUN.
+    """Compute bounds of the force at a deformation, from RUN.
 
     RUN is a result folder of `hdcal calibrate` or `diagnose`. Hypotheses of a diagnosis
     are averaged by their probability.
@@ -82,7 +85,7 @@ def margin(console: Console, run, out, force, certificate, **asked):
         models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
         if certificate and out is None:
-            words = "is written into a result folder"
+            words = "needs a result folder"
             wrong.append(Finding("certificate", words, "Give `out` too"))
         if models is not None:
             units = model_pairs(models)[0][1].case.units

@@ -81,10 +81,12 @@ def checked_request(model: JointModel, **asked: Any) -> MarginRequest:
     with Findings() as wrong:
         for name in ("deformation", "limit_force", "given_force", *_SHARES):
             if asked[name] is not None and _axes(asked[name]) != 0:
-                words, remedy = "is not one number", "Ask for one at a time"
+                words, remedy = "is not a single number", "Give one number"
                 wrong.append(Finding(name, words, remedy))
         if _axes(warm) not in (0, 1):
-            wrong.append(Finding("temperature", "is no list of numbers", "Give °C"))
+            wrong.append(
+                Finding("temperature", "is not a list of numbers", "Give numbers in °C")
+            )
     deformation, levels = (
         asked.pop("deformation"),
         np.atleast_1d(np.asarray(warm, float)),
@@ -109,16 +111,18 @@ def checked_request(model: JointModel, **asked: Any) -> MarginRequest:
         for name, known in _CHOICES.items():
             if asked[name] not in known:
                 words, remedy = (
-                    f"'{asked[name]}' is unknown",
+                    f"'{asked[name]}' is not possible",
                     f"Use {' or '.join(known)}",
                 )
                 wrong.append(Finding(name, words, remedy))
         if rule is not None and limit is None:
-            words, remedy = "decides nothing without a limit", "Give `limit_force` too"
+            words, remedy = "needs a limit", "Give `limit_force` too"
             wrong.append(Finding("rule", words, remedy))
         if asked["quantity"] == "load" and not _knows_contact(posterior):
-            words = "needs the place of first contact, and the readings are far from 0"
-            remedy = "State deformation_offset in [priors], or count from there"
+            words = (
+                "needs the position of first contact, but the readings are far from 0"
+            )
+            remedy = "State deformation_offset in [priors], or measure from contact"
             wrong.append(Finding("quantity", words, remedy))
     return MarginRequest(
         **asked,
@@ -148,8 +152,8 @@ def _deformation(
     if wrong := implausible(name, deformation, units.displacement):
         yield from wrong
     elif deformation == 0.0:
-        words = f"{deformation:g} {unit} is no {units.displacement}"
-        yield Finding(name, words, f"Give a number of {unit}")
+        words = f"the {units.displacement} is 0"
+        yield Finding(name, words, f"Give a {units.displacement} in {unit}, not 0")
     elif wrong := far_findings(deformation, tested, gear.reach, unit):
         yield from wrong
     else:
@@ -159,7 +163,7 @@ def _deformation(
 def _temperatures(model: JointModel, temperature: np.ndarray) -> list[Finding]:
     name = "temperature"
     if temperature.size == 0:
-        return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
+        return [Finding(name, "is empty", "Write it like -20:80, in °C")]
     if temperature.size > _MOST_TEMPERATURES:
         words = f"{temperature.size} temperatures are too many"
         return [Finding(name, words, f"Give at most {_MOST_TEMPERATURES}")]
@@ -177,15 +181,18 @@ def _force(
     if wrong := implausible(name, force):
         yield from wrong
     elif force == 0.0:
-        words = f"{force:g} {unit} is no {units.load}"
-        yield Finding(name, words, f"Give a number of {unit}")
+        words = f"the {units.load} is 0"
+        yield Finding(name, words, f"Give a {units.load} in {unit}, not 0")
     elif usual > 0.0 and not usual / OFF < abs(force) < usual * OFF:
-        words = f"{force:g} {unit}, where {place} takes about {digits(usual, 3)} {unit}"
-        yield Finding(name, words, f"Give it in {unit}")
+        words = f"{force:g} {unit} is not plausible: {place} needs about "
+        words += f"{digits(usual, 3)} {unit}"
+        yield Finding(name, words, f"Give the {units.load} in {unit}")
     elif name == "limit_force" and force < 0.0 < loading:
-        words = f"{force:g} {unit} is no limit of the {units.load} at {place}, "
-        remedy = f"Give {-force:g} {unit}, or ask at a negative {units.displacement}"
-        yield Finding(name, words + "which is positive", remedy)
+        words = (
+            f"{force:g} {unit} is negative, but the {units.load} at {place} is positive"
+        )
+        remedy = f"Give {-force:g} {unit}, or a negative {units.displacement}"
+        yield Finding(name, words, remedy)
 
 
 def _knows_contact(posterior: Posterior) -> bool:

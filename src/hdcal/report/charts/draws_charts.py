@@ -66,7 +66,7 @@ def _density_panel(posterior: Posterior, name: str) -> Panel:
     return Panel(
         x=f"{name} [{unit(shown)}]" if unit(shown) else name,
         y="",
-        title="driven by the data" if from_data else "prior-dominated",
+        title="driven by the data" if from_data else "driven by the prior",
         marks=[*marks, line],
         y_limits=(0.0, 1.08),
         y_ticks=False,
