@@ -95,7 +95,7 @@ def test_bad_input_is_refused_at_once_and_nothing_is_written(
         assert words in done.stderr
     for asked in ([cases["line"]], [cases["line"], cases["bad"]]):
         done = diagnose(*asked)
-        assert done.returncode == 2 and "last digit" in done.stderr
+        assert done.returncode == 2 and "exactly on a straight line" in done.stderr
     assert contents(tmp_path) == before
 
 
