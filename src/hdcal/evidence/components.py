@@ -29,7 +29,7 @@ from hdcal.evidence.parameter_grid import (
 )
 from hdcal.inference.distributions import quantiles
 from hdcal.inference.force_model.padding import repeat_last_row
-from hdcal.inference.force_model.problem import MEMBER_SD
+from hdcal.inference.force_model.values import MEMBER_SD
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.scatter import Scatter, scores

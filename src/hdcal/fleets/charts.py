@@ -80,7 +80,7 @@ def curves_chart(fleet: "Fleet") -> Chart:
     ordinary = table[~table["flagged"]].sort_values("stiffness_N_per_mm")
     some = np.linspace(0, len(ordinary) - 1, min(len(ordinary), _MOST_ORDINARY))
     shown = [(f"ordinary {fleet.part}s", ordinary.index[some.round().astype(int)])]
-    shown += [(row.gear, [row.Index]) for row in flagged.itertuples()]
+    shown += [(str(flagged["gear"][index]), [index]) for index in flagged.index]
     marks: list[Mark] = [Rule(at=0.0)]
     for (name, gears), colour in zip(shown, (GREY, *CYCLE[1:]), strict=False):
         rows = np.isin(gear, gears)
