@@ -1,23 +1,15 @@
-"""Log evidences are those of a reference, which `python test_reference.py` renews.
-
-The reference guards numbers that other tests hold within bounds only: cells, grids,
-kernels and noises of every hypothesis. A change of method renews it, on purpose.
-"""
-
-import json
-from pathlib import Path
+"""Log evidences are those of a reference: cells, grids, kernels and noises."""
 
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
+from reference import assert_reference
 from rigs import make_records
 
 from hdcal.data.case import Case
 from hdcal.evidence.search import search
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
-
-REFERENCE = Path(__file__).with_name("reference.json")
 
 
 def runs_of_gears() -> Case:
@@ -61,14 +53,4 @@ def log_evidences(case: Case, library: dict[str, type[Effect]]) -> dict[str, flo
 
 @pytest.mark.parametrize("name", CASES)
 def test_log_evidences_are_those_of_the_reference(name: str):
-    found, expected = log_evidences(*CASES[name]()), json.loads(REFERENCE.read_text())
-    assert found == pytest.approx(expected[name], abs=5e-3)
-
-
-if __name__ == "__main__":
-    values = {name: log_evidences(*make()) for name, make in CASES.items()}
-    rounded = {
-        name: {key: round(value, 4) for key, value in sorted(found.items())}
-        for name, found in values.items()
-    }
-    REFERENCE.write_text(json.dumps(rounded, indent=1) + "\n", "utf-8")
+    assert_reference(__file__, name, log_evidences(*CASES[name]()), abs=5e-3)
