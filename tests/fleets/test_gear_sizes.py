@@ -66,7 +66,7 @@ def test_a_table_that_cannot_be_read_is_refused(given, words):
 
 
 def test_without_sizes_in_a_gear_file_a_table_has_no_meaning():
-    assert "no gear file" in refused(gear_sizes, TABLE, case(None))[0]
+    assert "need a gear file" in refused(gear_sizes, TABLE, case(None))[0]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Gears to come, against gears that are drawn one by one."""
+"""Future gears, against gears that are drawn one by one."""
 
 import numpy as np
 import pytest
