@@ -14,6 +14,11 @@ log_probability = jax.jit(likelihood.log_probability, static_argnames="rounded")
 STEP = 0.98
 
 
+@pytest.fixture(autouse=True)
+def _double():
+    jax.config.update("jax_enable_x64", True)
+
+
 def one(sd, rows):
     return Noise(jnp.zeros(1), jnp.full((1, rows), sd))
 
