@@ -86,5 +86,5 @@ def test_derivatives_are_those_of_the_measured_rows(rounded):
     share = (np.asarray(case.records.run)[:, None] == np.arange(4)) - 0.25
     np.testing.assert_allclose(found.members[:, :4], values["run_offset_sd"] * share)
     np.testing.assert_allclose(
-        found.place[:4], values["run_offset"] / values["run_offset_sd"]
+        found.scores[:4], values["run_offset"] / values["run_offset_sd"]
     )
