@@ -132,7 +132,7 @@ def test_runs_that_were_measured_are_not_suggested():
     )
     done = {"load and unload at the same rate", "load and unload four times faster"}
     done |= {
-        "load, then hold the largest deformation for one minute",
+        "load, then hold the largest {displacement} for one minute",
         "load and unload at 50 °C",
     }
     assert done <= new and not done & measured

@@ -146,7 +146,7 @@ def test_folders_may_be_partitioned_and_labels_of_any_kind(tmp_path):
     [
         ({"force_N": np.nan}, "row 31"),
         ({"gear": None}, "label is empty"),
-        ({"deformation_mm": 45.0}, "'45 mm' on a radius of 40 mm"),
+        ({"deformation_mm": 45.0}, "'45 mm' is impossible at a radius of 40 mm"),
     ],
 )
 @pytest.mark.parametrize("batch", [30, 1 << 18])
