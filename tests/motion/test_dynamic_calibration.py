@@ -124,7 +124,7 @@ def test_a_file_gives_back_the_draws_and_the_seed_the_same_ones(posterior, tmp_p
 
 
 def test_a_failed_one_gives_no_force_and_no_motion(posterior):
-    with pytest.raises(InputError, match="moving gear"):
+    with pytest.raises(InputError, match="dynamic calibration"):
         predict(posterior, [0.1])
     failed = replace(posterior, checks=(Check("by hand", "failed", "told to"),))
     found = dynamic_calibration_of(failed)

@@ -291,7 +291,7 @@ def test_bad_requests_are_one_finding_each(here: Hdcal, tmp_path):
     table[table.specimen == "G 1"].to_csv(tmp_path / "line.csv", index=False)
     done = here("causes", "line.csv", "--library", "all", "--jobs", 0)
     assert done.returncode == 2
-    assert "3 or more" in done.stderr
+    assert "at least 3" in done.stderr
     assert "--library" in done.stderr and "--jobs" in done.stderr
     assert not (tmp_path / "line-causes").exists()
 
