@@ -15,9 +15,10 @@ from hdcal.evidence.noise_models import PRIOR_ODDS
 from hdcal.evidence.search import search
 from hdcal.fleets.reading.read_fleet import usable
 from hdcal.physics.registry import EFFECTS
+from hdcal.screening.channels import longest_stuck
 from hdcal.shared_causes import gear_evidence
 from hdcal.shared_causes.gear_evidence import Weight, by_cause, weigh_gear
-from hdcal.shared_causes.gears import _stuck, read_gears, usable_gears
+from hdcal.shared_causes.gears import read_gears, usable_gears
 from hdcal.shared_causes.result import FleetCauses
 
 LIBRARY = {
@@ -218,17 +219,17 @@ def test_holds_and_coarse_displays_are_not_stuck():
     crept = x.copy()
     crept[25:] += 0.1 * (1.0 - np.exp(-np.arange(20) / 12.0))
     one = np.zeros(45, int)
-    assert _stuck(x, relaxed, one, display=False) == 0
-    assert _stuck(force, crept, one, display=True) == 0
+    assert longest_stuck(x, relaxed, one, display=False) == 0
+    assert longest_stuck(force, crept, one, display=True) == 0
     fine, all_one = np.linspace(0.0, 0.5, 60), np.zeros(60, int)
     flat = np.minimum(200.0 * fine, 70.0)
-    assert _stuck(np.round(flat, 0), fine, all_one, display=True) == 0
-    assert _stuck(np.round(200.0 * fine, -1), fine, all_one, display=False) == 0
+    assert longest_stuck(np.round(flat, 0), fine, all_one, display=True) == 0
+    assert longest_stuck(np.round(200.0 * fine, -1), fine, all_one, display=False) == 0
     # The next run may begin where the last one ended.
     runs = np.repeat(np.arange(9), 5)
     level = np.repeat([1.0, 2.0, 2.001], 15)
-    assert _stuck(level, np.arange(45.0), one, display=True) == 15
-    assert _stuck(np.arange(45.0), np.arange(45.0), runs, display=False) == 0
+    assert longest_stuck(level, np.arange(45.0), one, display=True) == 15
+    assert longest_stuck(np.arange(45.0), np.arange(45.0), runs, display=False) == 0
 
 
 def failing(gear, library, seed: int):

@@ -32,7 +32,7 @@ _SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
-# Probability by which wild readings lie on one side by chance.
+# Significance level of the sign test of neighbouring outliers.
 _CHANCE = 0.01
 
 

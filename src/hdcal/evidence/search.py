@@ -114,8 +114,7 @@ class Searched:
 
     `effects` of the library predict something for the rows; of the others some are
     `lacking` columns that were not measured, and some are `excluded` by their priors.
-    `coarse_step` is that of readings on a coarse grid [N], else
-    0.
+    `coarse_step` is that of readings on a coarse grid [N], else 0.
     """
 
     coarse_step = 0.0

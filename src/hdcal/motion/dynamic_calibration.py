@@ -161,9 +161,8 @@ def whiteness_check(problem: DynamicProblem, values) -> Check:
     if p >= _LEAST_P:
         return Check(_WHITE, "passed", f"no correlation over rows (p = {p:.2g})")
     words = f"residuals are correlated from row to row (p = {p:.1g}): the model is "
-    return Check(
-        _WHITE, "warning", words + "incomplete, and the intervals are too narrow"
-    )
+    words += "incomplete, and the intervals are too narrow"
+    return Check(_WHITE, "warning", words)
 
 
 def _rate_check(problem: DynamicProblem, values) -> Check:

@@ -51,14 +51,11 @@ def highest_peak(problem: DynamicProblem) -> tuple[Whitening, Check]:
     mode = laplace.fit(problem, _start(problem, peaks[0]) if peaks else None)
     rivals = [p for p in peaks[1:] if abs(p[0] - peaks[0][0]) > width]
     if not rivals:
-        return mode, Check(
-            ONE_FREQUENCY, "passed", "all searches find the same frequency"
-        )
+        words = "all searches find the same frequency"
+        return mode, Check(ONE_FREQUENCY, "passed", words)
     drop = _misfit(problem, rivals[0]) - _misfit(problem, peaks[0])
-    words = (
-        f"the next one has a log likelihood {drop:.0f} lower; at least {_RIVAL:g} "
-        "needed"
-    )
+    words = f"the next one has a log likelihood {drop:.0f} lower; at least "
+    words += f"{_RIVAL:g} is needed"
     return mode, Check(ONE_FREQUENCY, "passed" if drop >= _RIVAL else "failed", words)
 
 

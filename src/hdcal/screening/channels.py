@@ -1,4 +1,4 @@
-"""Single channels: saturation, and a gauge that trembles."""
+"""Single channels: saturation, a stuck channel, and a gauge that trembles."""
 
 from typing import Any
 
@@ -44,6 +44,35 @@ def _plateau(held: np.ndarray, moving: np.ndarray) -> np.ndarray:
         if goes_on and beyond >= _MOVES * np.ptp(moving):
             found[first:stop] = True
     return found
+
+
+def longest_stuck(
+    held: np.ndarray, moving: np.ndarray, run: np.ndarray, *, display: bool
+) -> int:
+    """Return the most equal readings in a row while the other channel moves on, or 0.
+
+    A coarse display repeats readings where the curve is flat, which counts as stuck
+    unless `display`. In a hold the other channel may creep, more slowly than before.
+    """
+    steps, span = np.diff(np.unique(held)), np.ptp(held)
+    if not len(steps):
+        return 0
+    multiples = steps / steps.min()
+    coarse = np.allclose(multiples, multiples.round(), rtol=0.0, atol=1e-3)
+    if display and coarse and steps.min() > _DIGITS * span:
+        return 0
+    step = np.abs(np.diff(moving))
+    pace = _PACE * np.median(step[np.diff(run) == 0])
+    # Equal readings of a display differ by less than one of its steps.
+    least = max(_MOVES, 2.0 * steps.min() / span) * np.ptp(moving)
+    begins = np.r_[True, (np.diff(held) != 0.0) | (np.diff(run) != 0)]
+    longest = 0
+    for rows in np.split(np.arange(len(held)), np.flatnonzero(begins)[1:]):
+        if len(rows) >= _FEWEST_HELD and (
+            np.ptp(moving[rows]) > least and np.median(step[rows[:-1]]) > pace
+        ):
+            longest = max(longest, len(rows))
+    return longest
 
 
 _BLOCKS = 12  # rows that are averaged into one, to see the slope without the scatter

@@ -34,6 +34,8 @@ SEGMENTS = (
     "outside the range",
     "repeated reading",
 )
+# Words for people, where the key of a segment is another one.
+SEGMENT_WORDS = {"wild reading": "outlier"}
 LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE, REPEATED = range(
     len(SEGMENTS)
 )

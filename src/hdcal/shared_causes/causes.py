@@ -17,7 +17,6 @@ from hdcal.diagnosis.decision import TEMPERATURE
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings
 from hdcal.evidence.table import OUTSIDE
-from hdcal.fleets.reading.readings import FleetReadings
 from hdcal.inference.checks import mixing_checks
 from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
@@ -76,12 +75,15 @@ def causes(
         effects = wrong.attempt(library_of, library)
     assert effects is not None
     readings = read_gears(data, gear, columns=columns)
+    usable = usable_gears(readings, skip_bad=skip_bad)
     how = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed, "progress": progress}
-    return causes_of(readings, effects, **how)
+    return causes_of(*usable, effects, **how)
 
 
 def causes_of(
-    readings: FleetReadings,
+    case: Case,
+    gears: Mapping[str, Case],
+    left_out: Mapping[str, Finding],
     effects: Mapping[str, type[Effect]],
     *,
     jobs: int,
@@ -89,15 +91,14 @@ def causes_of(
     seed: int,
     progress: Progress | None,
 ) -> FleetCauses:
-    """Return the result for readings; the arguments are those of `causes`."""
-    case, gears, left_out = usable_gears(readings, skip_bad=skip_bad)
+    """Return the result for `usable_gears`; the others are arguments of `causes`."""
     check_effect_priors(case, {**EFFECTS, **effects})
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
     tasks = [(each, effects, seed) for each in gears.values()]
     weights = dict(zip(gears, run_all(weigh_gear, tasks, jobs, progress), strict=True))
     failed = {gear: w for gear, w in weights.items() if isinstance(w, Finding)}
     gears = without_bad(gears, failed, skip_bad=skip_bad)
-    left_out |= failed
+    left_out = {**left_out, **failed}
     return _together(case, gears, [weights[g] for g in gears], left_out, effects, seed)
 
 

@@ -47,17 +47,17 @@ def causes(console: Console, out, force, seed, library, jobs, skip_bad, **given)
         effects = wrong.attempt(choose_library, library)
         if gear_files(given["data"]):
             wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
-        readings = None
+        readings = usable = None
         if given["columns"] is not None:
             readings = wrong.attempt(read_gears, **given)
         if readings is not None:
-            wrong.attempt(usable_gears, readings, skip_bad=skip_bad)
+            usable = wrong.attempt(usable_gears, readings, skip_bad=skip_bad)
             out = f"{readings.case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
-    assert readings is not None and effects is not None
+    assert usable is not None and effects is not None
     from hdcal.shared_causes.causes import causes_of
 
     asked = {"jobs": jobs, "skip_bad": skip_bad, "seed": seed}
     with progress_bar("weighing") as progress:
-        found = causes_of(readings, effects, progress=progress, **asked)
+        found = causes_of(*usable, effects, progress=progress, **asked)
     return console.show(found, tables={"gears.csv": found.to_frame()})

@@ -15,15 +15,12 @@ from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.row_features import take_rows
 from hdcal.fleets.reading.read_fleet import read_fleet, usable
 from hdcal.fleets.reading.readings import FleetReadings
+from hdcal.screening.channels import longest_stuck
 
 # Frequencies of causes need several gears.
 _FEWEST = 3
 # Rows of a gear beyond those that its stiffness and the offsets of its runs use up.
 _FEWEST_LEFT = 8
-# Equal readings in a row of a stuck channel, the steps of a force that may repeat where
-# a curve is flat, as a share of the range, and the share of its range and of its usual
-# step by which the other channel has to move on.
-_FEWEST_STUCK, _COARSE, _MOVES, _PACE = 5, 2e-3, 0.1, 0.5
 
 
 def read_gears(data: Any, gear: Any = None, **how: Any) -> FleetReadings:
@@ -71,10 +68,8 @@ def without_bad(
         raise InputError([*bad.values(), offer(bad, len(gears))])
     if len(left) < _FEWEST:
         words = f"{len(left)} of {len(gears)} gears can be used"
-        remedy = (
-            f"Frequencies of causes need {_FEWEST} or more gears, named in a column "
-        )
-        remedy += "specimen"
+        remedy = f"Frequencies of causes need {_FEWEST} or more gears, named in a "
+        remedy += "column specimen"
         raise InputError([*bad.values(), Finding("data", words, remedy)])
     return left
 
@@ -113,7 +108,7 @@ def _fault(gear: Case) -> Finding | None:
     units, run = gear.units, np.asarray(gear.records.run)
     load, displacement = (units.load, force), (units.displacement, read)
     for (name, held), (other, moving) in ((load, displacement), (displacement, load)):
-        if rows := _stuck(held, moving, run, display=held is force):
+        if rows := longest_stuck(held, moving, run, display=held is force):
             words = f"the {name} is stuck: {rows} equal readings in a row while the "
             words += f"{other} moves on"
             remedy = "Correct the record, or leave the gear out"
@@ -123,32 +118,3 @@ def _fault(gear: Case) -> Finding | None:
     except InputError as error:
         return error.findings[0]
     return None
-
-
-def _stuck(
-    held: np.ndarray, moving: np.ndarray, run: np.ndarray, *, display: bool
-) -> int:
-    """Return the most equal readings in a row while the other channel moves on, or 0.
-
-    A coarse display repeats readings where the curve is flat, which counts as stuck
-    unless `display`. In a hold the other channel may creep, more slowly than before.
-    """
-    steps, span = np.diff(np.unique(held)), np.ptp(held)
-    if not len(steps):
-        return 0
-    multiples = steps / steps.min()
-    coarse = np.allclose(multiples, multiples.round(), rtol=0.0, atol=1e-3)
-    if display and coarse and steps.min() > _COARSE * span:
-        return 0
-    step = np.abs(np.diff(moving))
-    pace = _PACE * np.median(step[np.diff(run) == 0])
-    # Equal readings of a display differ by less than one of its steps.
-    least = max(_MOVES, 2.0 * steps.min() / span) * np.ptp(moving)
-    begins = np.r_[True, (np.diff(held) != 0.0) | (np.diff(run) != 0)]
-    longest = 0
-    for rows in np.split(np.arange(len(held)), np.flatnonzero(begins)[1:]):
-        if len(rows) >= _FEWEST_STUCK and (
-            np.ptp(moving[rows]) > least and np.median(step[rows[:-1]]) > pace
-        ):
-            longest = max(longest, len(rows))
-    return longest

@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import CYCLE, Chart, Panel, Points, drawn_rows
-from hdcal.screening.result import REPEATED, SEGMENTS, Screening
+from hdcal.screening.result import REPEATED, SEGMENT_WORDS, SEGMENTS, Screening
 
 # A row that repeats the one before would hide it.
 _DRAWN = [place for place in range(len(SEGMENTS)) if place != REPEATED]
@@ -49,9 +49,9 @@ def left_out(found: Screening, segments: Iterable[int] = _DRAWN) -> Iterator[Poi
     some = np.flatnonzero(~found.kept & np.isin(found.segment, [*segments]))
     some = some[drawn_rows(found.force[some])]
     for segment in np.unique(found.segment[some]):
-        these = some[found.segment[some] == segment]
+        these, name = some[found.segment[some] == segment], SEGMENTS[segment]
         yield Points(
-            label=f"left out: {SEGMENTS[segment].replace('wild reading', 'outlier')}",
+            label=f"left out: {SEGMENT_WORDS.get(name, name)}",
             x=found.deformation[these],
             y=found.force[these],
             colour=CYCLE[(segment + 1) % len(CYCLE)],

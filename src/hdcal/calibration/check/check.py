@@ -20,7 +20,7 @@ from hdcal.report.charts.chart_spec import Chart
 from hdcal.report.item import Count, Digest, EffectName, Item, Words
 from hdcal.report.result import Result
 from hdcal.report.words import UNITS
-from hdcal.screening.result import HOLDING, LOADING, SEGMENTS, Screening
+from hdcal.screening.result import HOLDING, LOADING, SEGMENT_WORDS, SEGMENTS, Screening
 
 # Prior standard deviations of log K that contain 99.7 % of it.
 _FAR = 3.0
@@ -141,10 +141,10 @@ class CaseCheck(Result):
 
     @property
     def left_out(self) -> dict[str, int]:
-        """Number of rows of each segment that was left out."""
+        """Number of rows of each segment that was left out, by its words."""
         kept = SEGMENTS[LOADING : HOLDING + 1]
         found = self.screening.segments if self.screening else {}
-        return {name: rows for name, rows in found.items() if name not in kept}
+        return {SEGMENT_WORDS.get(n, n): k for n, k in found.items() if n not in kept}
 
     @property
     def takes_part(self) -> bool:

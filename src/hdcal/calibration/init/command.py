@@ -91,9 +91,8 @@ def init(console: Console, folder, data, columns, sheet, **stated):
     several = case is not None and len(case.specimen_labels) > 1
     next_step = f"hdcal {'fleet' if several else 'calibrate'} {folder} --out result"
     if data is None:
-        next_step = (
-            f"copy the readings to {DATA_NAME} in this folder, then run {next_step}"
-        )
+        place = f"copy the readings to {DATA_NAME} in this folder"
+        next_step = f"{place}, then run {next_step}"
     console.words(f"{', '.join(files)} written to {folder}. Next: {next_step}")
     if console.json:
         console.data({"status": "ok", "folder": folder, "files": [*files]})

@@ -94,10 +94,8 @@ def _one_each(
     if (several := each["of"].duplicated()).any():
         word = "specimen" if quantity == "lot" else "run"
         name = quoted(names[each["of"][several].min()])
-        return (
-            (),
-            f"the column {quantity} is not used: {word} {name} has several values",
-        )
+        why = f"{word} {name} has several values"
+        return (), f"the column {quantity} is not used: {why}"
     stated = dict(zip(each["of"], each["label"], strict=True))
     return tuple(stated.get(i, NOT_STATED) for i in range(len(names))), ""
 

@@ -110,8 +110,7 @@ def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[st
             f"{ASSUMED}without a column `run`, rows of a gear that differ in "
             f"{' or '.join(telling)} belong to different mountings: {runs} mountings "
             f"of {gears} gear{'s' if gears > 1 else ''}. If not, label the mountings "
-            "in a "
-            "column `run`"
+            "in a column `run`"
         )
 
 
@@ -122,6 +121,5 @@ def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
         yield (
             f"this gear was measured on {many} rigs, which a calibration or a "
             "diagnosis treats as one: a difference of their gains appears as a change "
-            "of the "
-            "gear. Give the rows of one rig at a time, or use `hdcal fleet`"
+            "of the gear. Give the rows of one rig at a time, or use `hdcal fleet`"
         )

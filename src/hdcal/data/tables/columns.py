@@ -273,8 +273,6 @@ def _refuse_conflicts(
             findings.add(words, remedy, table.header_row, column.header)
         unit = table.conflicts.get(column.position)
         if unit and column.unit is not None and not column.against:
-            words = (
-                f"{quoted(column.header)} states {column.unit.name}, but the row of "
-            )
-            words += f"units {unit}"
+            words = f"{quoted(column.header)} states {column.unit.name}, but the row "
+            words += f"of units {unit}"
             findings.add(words, "Remove the wrong one", table.unit_row)

@@ -108,12 +108,8 @@ def _labels(
     if not optional:
         words = f"the {column.quantity} label is empty"
         places = np.flatnonzero(empty).tolist()
-        _add(
-            table,
-            [(place, words, "Fill in the label") for place in places],
-            column,
-            findings,
-        )
+        faults = [(place, words, "Fill in the label") for place in places]
+        _add(table, faults, column, findings)
     blank = NOT_STATED if optional else ""
     return np.array([with_formula(text) or blank for text in texts], object)[index]
 

@@ -32,16 +32,12 @@ def sheet_grid(
         return sheets[sheet], [], sheet if {*likely} - {sheet} else ""
     if not likely:
         words = f"no sheet contains a table of readings: {names}"
-        remedy = (
-            f"Write at least {_FEWEST} rows of readings below headers. Formulas are "
-            "read "
-        )
-        remedy += "only if a spreadsheet program has computed and saved their values"
+        remedy = f"Write at least {_FEWEST} rows of readings below headers. Formulas "
+        remedy += "are read only if a spreadsheet program has saved their values"
         findings.refuse(words, remedy)
     if len(likely) > 1:
-        words = (
-            f"{len(likely)} sheets contain a table: {', '.join(map(quoted, likely))}"
-        )
+        tables = ", ".join(map(quoted, likely))
+        words = f"{len(likely)} sheets contain a table: {tables}"
         findings.refuse(words, "Select one with `sheet`")
     note = f"sheet {quoted(likely[0])} is read. Select another one with `sheet`"
     return sheets[likely[0]], [note] if len(sheets) > 1 else [], ""

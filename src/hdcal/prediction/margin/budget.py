@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from hdcal.prediction.joint import JointModel
 from hdcal.prediction.members import Members
-from hdcal.quantities import Quantities
 from hdcal.report.item import Item, Probability, Words, quantity
 
 # A correlation of this many standard errors, or less, may be chance in the draws: over
@@ -52,9 +52,11 @@ _TYPE_A = {"stiffness", "bend", "K"}
 class BudgetRow(Item):
     """One component of the uncertainty; the shares of all rows sum to 1.
 
-    Type A where the readings determine it, B by other knowledge (JCGM 100).
+    Type A where the readings determine it, B by other knowledge (JCGM 100). The input
+    is a key of `_INPUTS`.
     """
 
+    input: str = Field(exclude=True)
     component: Words = quantity("component")
     type_: Literal["A", "B"] = quantity("type")
     distribution: Words = quantity("distribution")
@@ -127,12 +129,6 @@ def budget(
     return tuple(ranked), direction * estimate, total**0.5
 
 
-def zero_words(units: Quantities) -> tuple[str, ...]:
-    """Return the components that a reading of the gauge out of contact determines."""
-    zeros = "deformation_offset", "force_offset"
-    return tuple(_INPUTS[name][0].format(load=units.load) for name in zeros)
-
-
 def _row(name: str, row, total: float, model: JointModel, direction: int) -> BudgetRow:
     own, tied, variance = map(float, row)
     label, unit, distribution, site = _INPUTS[name]
@@ -146,6 +142,7 @@ def _row(name: str, row, total: float, model: JointModel, direction: int) -> Bud
         sites += [n for n in model.draws if n.partition(".")[0] in noises]
     by_data = site in _TYPE_A or any(model.driver(each) == "data" for each in sites)
     return BudgetRow(
+        input=name,
         component=label.format(load=units.load),
         type_="A" if by_data else "B",
         distribution=distribution,

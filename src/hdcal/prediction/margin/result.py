@@ -7,7 +7,7 @@ import pandas as pd
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.margin.budget import BudgetRow, zero_words
+from hdcal.prediction.margin.budget import BudgetRow
 from hdcal.prediction.margin.charts import budget_chart, force_chart
 from hdcal.prediction.margin.levels import Conformity, Level
 from hdcal.prediction.margin.reached import Reached
@@ -92,7 +92,7 @@ class Margin(MarginRequest, Result):
     def is_zero_unread(self) -> bool:
         """Whether a zero is the largest component, and nobody stated the gauge's."""
         largest, stated = self.budget[0], is_stated(self.posterior, "force_offset")
-        return not stated and largest.component in zero_words(self.units)
+        return not stated and largest.input in ("deformation_offset", "force_offset")
 
     @property
     def facts(self) -> dict[str, str]:
