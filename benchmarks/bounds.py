@@ -184,7 +184,7 @@ def _hold(truth: dict, levels: np.ndarray, held: dict) -> None:
     member = mean + sd * truth["score"]
     outer = mean + sd * ndtri(CONTENT)
     low, high, least, most, _, upper = levels.T
-    for group in ("all", "fitted leftover" if truth["with_gap"] else "line"):
+    for group in ("all", "fitted discrepancy" if truth["with_gap"] else "line"):
         held[f"mean, {group}"].append((low <= mean) & (mean <= high))
     held[f"mean, {kind}"].append((low <= mean) & (mean <= high))
     held[f"mean, r = {truth['r']:g}"].append((low <= mean) & (mean <= high))

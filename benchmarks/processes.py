@@ -32,7 +32,7 @@ COMMANDS = {
         "calibrate {data}/xb1-100-80 --out {own}/first --force",
         None,
     ),
-    "calibrate, with a leftover": (
+    "calibrate, with a discrepancy": (
         "calibrate {data}/xb1-100-80 --with-gap --out {own}/gap --force",
         None,
     ),

@@ -149,7 +149,7 @@ def test_a_diametral_reading_halves_the_radial_deformation():
 
 
 def test_drawn_members_do_not_count_in_the_likelihood():
-    """Rows are kept for an effect; the leftover is integrated out all the same."""
+    """Rows are kept for an effect; the discrepancy is integrated out all the same."""
     case, chosen = make_case(with_force(cycles(48))), (EFFECTS["coulomb_friction"],)
     form = form_of(case, chosen, True)
     problem = build_problem(case, effect_priors(), chosen, structure=form)

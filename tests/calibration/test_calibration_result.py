@@ -11,7 +11,7 @@ from posteriors import (
     regressed,
     single,
     spring,
-    with_leftover,
+    with_discrepancy,
     written_posterior,
 )
 from rigs import make_gear
@@ -110,7 +110,7 @@ def test_a_shape_of_the_residuals_is_in_headline_and_steps():
 
 
 def test_charts_show_readings_bands_and_densities():
-    posterior = with_leftover()
+    posterior = with_discrepancy()
     found = calibration_of(posterior)
     charts = found.charts()
     top, below = charts["calibration"].panels

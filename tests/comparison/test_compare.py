@@ -10,7 +10,7 @@ from posteriors import (
     ramp_case,
     single,
     stiffer,
-    with_leftover,
+    with_discrepancy,
     written_posterior,
 )
 from rigs import make_gear
@@ -56,8 +56,8 @@ def test_models_count_as_they_are_probable_and_resolved_differences_come_first()
     assert found.to_frame().gear.tolist() == ["A", "B", "C"]
 
 
-def test_other_ranges_and_leftovers_are_noted():
-    plain, other = of(200.0, 1.0, 1), with_leftover(400)
+def test_other_ranges_and_discrepancies_are_noted():
+    plain, other = of(200.0, 1.0, 1), with_discrepancy(400)
     records = other.case.records
     wider = replace(records, deformation=1.5 * records.deformation)
     other = replace(other, case=replace(other.case, records=wider, data_sha256="1"))

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from designs import calibrated, known
 from mirrored import mirrored
-from posteriors import batch, single, spring, with_leftover
+from posteriors import batch, single, spring, with_discrepancy
 
 from hdcal.design.gears import calibrated_gears
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
-from hdcal.prediction.simulate import gear_leftover
+from hdcal.prediction.simulate import gear_discrepancy
 from hdcal.prediction.sizes import stiffness_ratio
 
 AT, WARM = np.array([0.1, 0.4]), np.full(2, 20.0)
@@ -21,7 +21,7 @@ def test_the_rig_is_no_part_of_it():
     zeros = {"force_offset": 9.0, "deformation_offset": 0.1}
     loose = calibrated(100, "rig_compliance", rig_compliance__compliance=1e-3, **zeros)
     gears = calibrated_gears(loose)
-    bend = gear_leftover(gears.model, AT, seed=0).T
+    bend = gear_discrepancy(gears.model, AT, seed=0).T
     forces = np.outer(AT, loose.draws["stiffness"]) + bend
     np.testing.assert_allclose(gears.forces(AT, WARM), forces, 1e-9)
 
@@ -58,7 +58,7 @@ def test_tolerances_and_tested_gears_scatter_the_next_one():
     assert not np.any(calibrated_gears(single()).next_ones({}, 0, 1).deviation)
 
 
-@pytest.mark.parametrize("make", [with_leftover, lambda: batch(6, 2000)])
+@pytest.mark.parametrize("make", [with_discrepancy, lambda: batch(6, 2000)])
 def test_gears_that_are_pulled_are_the_mirror_of_those_that_are_pressed(make):
     gear, at = make(), np.array([0.1, 0.4, 0.7])
     pressed = calibrated_gears(gear).next_ones({}, 0, 1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from designs import bent, known
 from mirrored import mirrored
-from posteriors import with_leftover
+from posteriors import with_discrepancy
 from scipy.stats import lognorm
 
 from hdcal.design import study as module
@@ -42,7 +42,7 @@ def test_bands_of_every_combination_are_those_of_the_draws():
     assert len([mark for mark in panel.marks if isinstance(mark, Line)]) == 2
 
 
-@pytest.mark.parametrize("make", [bent, with_leftover])
+@pytest.mark.parametrize("make", [bent, with_discrepancy])
 def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
     gears = calibrated_gears(make(200))
     random = np.random.default_rng(0)

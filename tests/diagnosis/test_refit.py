@@ -28,7 +28,7 @@ PAIRS = {f"a+{name}": 0.04 for name in "defg"}
 # Chances, calibrations that fail, widths; what is calibrated, the shares of the models,
 # and which of them stands for the others.
 CASES = {
-    "the likeliest effect with a leftover": (
+    "the likeliest effect with a discrepancy": (
         ({"a": 0.7, "none": 0.06, "unknown": 0.06, "c": 0.02, **PAIRS},),
         {"a": 0.7, "none": 0.06, "unknown": 0.06, "a+unknown": 0.18},
         "a+unknown",

@@ -48,7 +48,7 @@ def test_the_gap_takes_no_offset_and_no_slope(loading, tested):
     [("coulomb_friction", False), ("hysteresis", False), ("thermal_zero_drift", True)],
 )
 def test_with_an_effect_that_draws_loops_the_gap_has_none(loading, name, looped):
-    """Else the effect's size would be the leftover's to choose."""
+    """Else the effect's size would be the discrepancy's to choose."""
     gap = build_discrepancy(loading, [EFFECTS[name]])
     place, up = np.linspace(0.02, 0.54, 9), np.ones(9)
     rising, falling = (np.asarray(gap.columns(place, way * up)) for way in (1.0, -1.0))

@@ -32,7 +32,7 @@ def several(records):
 KINDS = {
     "compressed, warm": (cycles(), (), {}, False),
     "members": (several(cycles()), (), {}, False),
-    "leftover": (ramp(30), (), {}, True),
+    "discrepancy": (ramp(30), (), {}, True),
     "rounded": (ramp(), (), {"resolution": 0.98, "reading": "diametral"}, False),
     "effects": (cycles(), ("hysteresis", "thermal_zero_drift"), {}, False),
     "effects, members": (several(cycles()), ("progressive_stiffening",), {}, True),

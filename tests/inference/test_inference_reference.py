@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
-from posteriors import batch, single, with_leftover
+from posteriors import batch, single, with_discrepancy
 from reference import assert_reference
 from rigs import cycles, make_records, ramp
 from structures import form_of
@@ -129,7 +129,7 @@ def test_structures_and_pilot_fits_are_those_of_the_reference(name: str):
     assert_reference(__file__, f"structure {name}", numbers, rel=1e-5)
 
 
-@pytest.mark.parametrize("make", (single, batch, with_leftover))
+@pytest.mark.parametrize("make", (single, batch, with_discrepancy))
 @pytest.mark.parametrize("shape", ("none", "bend", "growing", "wild", "serial"))
 def test_findings_in_residuals_are_those_of_the_reference(make, shape: str):
     posterior = make(size=400)

@@ -16,13 +16,13 @@ from hdcal.inference.force_model.marginal import Linear, contrasts, draw_members
 from hdcal.inference.force_model.problem import Problem, build_problem
 from hdcal.inference.force_model.values import MEMBERS
 
-# Known covariates, number of specimens, stated sds of a reading, leftover.
+# Known covariates, number of specimens, stated sds of a reading, discrepancy.
 STRUCTURES = {
     "rows": ({"run"}, 1, (0.1, 0.6), True),
     "compressed": ({"run", "specimen"}, 3, (0.0,), True),
     "one sd": ({"run"}, 1, (0.4,), False),
     "specimens": ({"specimen"}, 6, (0.0,), False),
-    "leftover": (set(), 1, (0.0,), True),
+    "discrepancy": (set(), 1, (0.0,), True),
     "independent": ({"run"}, 1, (0.0,), False),
 }
 log_likelihood = jax.jit(Problem.log_likelihood)

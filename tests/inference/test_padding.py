@@ -26,7 +26,7 @@ def test_few_lengths_hold_every_number_of_rows():
 
 @pytest.fixture(scope="module")
 def rounded(loading):
-    """Rows with runs and a leftover that are sampled, their problem and a draw."""
+    """Rows with runs and a discrepancy that are sampled, their problem and a draw."""
     rng, rows = np.random.default_rng(4), len(loading.force)
     records = replace(
         loading,

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from posteriors import batch, beside, single, with_leftover
+from posteriors import batch, beside, single, with_discrepancy
 
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.force_model import problem as problem_module
@@ -32,7 +32,7 @@ def average() -> ModelAverage:
     models = (
         single(size=40),
         beside(single(size=40), "contact_onset"),
-        with_leftover(60),
+        with_discrepancy(60),
     )
     weighed = zip(SHARES.values(), models, strict=True)
     left_out = LeftOut(0.04, "unknown")

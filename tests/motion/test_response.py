@@ -89,7 +89,7 @@ def test_effects_of_the_moment_act_and_others_are_left_out():
 
 
 @pytest.mark.thorough
-def test_a_fitted_leftover_bends_the_motion_as_it_bends_the_force():
+def test_a_fitted_discrepancy_bends_the_motion_as_it_bends_the_force():
     from hdcal.prediction.conditions import Conditions
     from hdcal.prediction.joint import joint
     from hdcal.prediction.simulate import gear_forces

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from posteriors import ramp_case, regressed, single, with_leftover, written_posterior
+from posteriors import ramp_case, regressed, single, with_discrepancy, written_posterior
 from slices import slice_of
 
 import hdcal
@@ -72,7 +72,9 @@ def test_laws_have_the_probability_of_the_residuals():
     assert means[1] > 3.0 * means[0]
 
 
-@pytest.mark.parametrize("make", slice_of([single, with_leftover], [with_leftover]))
+@pytest.mark.parametrize(
+    "make", slice_of([single, with_discrepancy], [with_discrepancy])
+)
 @pytest.mark.parametrize("at", [0.02, 0.28, 0.54])
 def test_there_is_no_step_at_the_ends_or_in_the_middle(make, at: float):
     places = at + np.array([-1e-6, 0.0, 1e-6])
@@ -106,9 +108,9 @@ def test_an_outlier_is_no_bend():
     assert straight < 0.5 * bent
 
 
-def test_beyond_the_end_the_bend_replaces_a_fitted_leftover():
-    """Far beyond the end the leftover has no part; within the range only it has one."""
-    posterior = with_leftover(400)
+def test_beyond_the_end_the_bend_replaces_a_fitted_discrepancy():
+    """Far beyond the end it has no part; within the range it alone has one."""
+    posterior = with_discrepancy(400)
     shift = 10.0 / (1.0 + np.arange(20.0)) ** 2
     moved = {"gap_weights": posterior.draws["gap_weights"] + shift}
     other = written_posterior(ramp_case(), {**posterior.draws, **moved}, with_gap=True)

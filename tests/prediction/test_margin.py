@@ -14,7 +14,7 @@ from posteriors import (
     single,
     spring,
     stiffer,
-    with_leftover,
+    with_discrepancy,
     written_posterior,
 )
 from scipy import stats
@@ -193,8 +193,8 @@ def test_the_inverse_inverts(gears):
 # --- beyond the data, several models, other quantities ---
 
 
-def test_a_fitted_leftover_is_in_the_force():
-    posterior = with_leftover(1000)
+def test_a_fitted_discrepancy_is_in_the_force():
+    posterior = with_discrepancy(1000)
     found = hdcal.margin(posterior, 0.3).worst.force_N
     bands = hdcal.predict(posterior, [0.3])
     assert (found.lo, found.hi) == pytest.approx(

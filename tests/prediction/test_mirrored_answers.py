@@ -9,7 +9,7 @@ from posteriors import (
     ramp_case,
     single,
     stiffer,
-    with_leftover,
+    with_discrepancy,
     written_posterior,
 )
 from rigs import make_gear
@@ -82,14 +82,14 @@ ASKED = {
     ),
     "specimens": (lambda: batch(6, SIZE), AT | WARM | {"given_force": 80.0}),
     "averaged": (two_models, AT | {"given_force": 80.0}),
-    "leftover": (
-        lambda: with_leftover(SIZE),
+    "discrepancy": (
+        lambda: with_discrepancy(SIZE),
         AT | {"deformation": 0.58, "limit_force": 118.0},
     ),
     "unloading": (friction, AT | {"direction": "down", "given_force": 80.0}),
     "drifting zero": (lambda: looped(thermal_zero_drift__slope=0.1), AT | WARM),
 }
-QUICK = ("rounded", "averaged", "leftover", "unloading")
+QUICK = ("rounded", "averaged", "discrepancy", "unloading")
 
 
 @pytest.mark.parametrize("name", slice_of(ASKED, QUICK))
@@ -144,7 +144,7 @@ TURNED = {"up": "down", "down": "up"}
 
 
 @pytest.mark.parametrize("way", TURNED)
-@pytest.mark.parametrize("make", [friction, lambda: with_leftover(SIZE)])
+@pytest.mark.parametrize("make", [friction, lambda: with_discrepancy(SIZE)])
 def test_the_bands_are_mirrored(make, way: str):
     known, at = make(), np.array([-0.1, 0.1, 0.4, 0.6])
     found = hdcal.predict(known, at, [20.0, 60.0], way)

@@ -1,7 +1,7 @@
 """Answers about forces have the numbers of a reference."""
 
 import pytest
-from posteriors import batch, single, with_leftover
+from posteriors import batch, single, with_discrepancy
 from reference import assert_reference
 
 import hdcal
@@ -10,7 +10,10 @@ ASKED = {
     "single": (single, {"limit_force": 85.0, "population": "readings"}),
     "gears": (batch, {"limit_force": 90.0, "population": "specimens"}),
     "mountings": (batch, {"limit_force": 90.0, "population": "mountings"}),
-    "leftover": (with_leftover, {"quantity": "load", "temperature": [20.0, 60.0]}),
+    "discrepancy": (
+        with_discrepancy,
+        {"quantity": "load", "temperature": [20.0, 60.0]},
+    ),
 }
 
 

@@ -11,7 +11,7 @@ from posteriors import (
     plain_draws,
     ramp_case,
     single,
-    with_leftover,
+    with_discrepancy,
     written_posterior,
 )
 
@@ -101,7 +101,7 @@ def test_a_quantity_is_that_of_each_draw_by_itself(quantity: str):
 
 def test_nothing_grows_between_rest_and_the_tested_range_of_a_gear():
     """The free shape is known without force, on the way to the other side too."""
-    for make in (single, with_leftover):
+    for make in (single, with_discrepancy):
         places = [-1e-6, 1e-3, 0.02, 0.3, 0.9]
         bend = simulated(make(size=200), at=places, quantity="gear").common["bend"]
         np.testing.assert_allclose(bend[:, :2], bend[:, [2, 2]], atol=0.02)

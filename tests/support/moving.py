@@ -106,7 +106,7 @@ def still_posterior(effects: dict | None = None, *, gap=None, K: float = 0.0):
 
     Args:
         effects: value of each `effect.parameter`.
-        gap: weights of the leftover discrepancy, or None.
+        gap: weights of the discrepancy, or None.
         K: relative sd of K over the draws.
     """
     names = dict.fromkeys(name.partition(".")[0] for name in effects or {})

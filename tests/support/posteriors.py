@@ -176,8 +176,8 @@ def batch(count: int = 6, size: int = 2000) -> Posterior:
     return written_posterior(case, draws)
 
 
-def with_leftover(size: int = 2000) -> Posterior:
-    """Return a posterior of one gear with a leftover discrepancy of a newton."""
+def with_discrepancy(size: int = 2000) -> Posterior:
+    """Return a posterior of one gear with a discrepancy of a newton."""
     case, rng = ramp_case(), np.random.default_rng(2)
     draws = plain_draws(case, size) | {
         "gap_sd": np.abs(rng.normal(1.5, 0.3, size)),

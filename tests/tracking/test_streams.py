@@ -36,7 +36,7 @@ def streams(
 ):
     """Yield streams of gears that are draws of the posterior, with their stiffness.
 
-    Errors at untested conditions and of the leftover are from the model itself.
+    Errors at untested conditions and of the discrepancy are from the model itself.
     """
     every, start = draws_of(posterior)[0], Tracker(posterior, alarm_rows=100.0)
     start = start if known is None else with_correlation(start, known)
@@ -67,7 +67,7 @@ def check(found, rows: int) -> None:
 
 
 def with_newtons():
-    """Return a posterior whose leftover is of a newton and known to half of that."""
+    """Return a posterior whose discrepancy is of a newton and known to half of that."""
     case, rng = ramp_case(), np.random.default_rng(2)
     size = np.where(np.arange(20) < 8, 1.0, 1e-3) / (1.0 + np.arange(20.0))
     weights = 2.0 * size * (np.array([1.0, -1.0] * 10) + rng.normal(size=(2000, 20)))
@@ -91,7 +91,7 @@ OFF_THE_MIDDLE = np.linspace(0.25, 0.5, 25)
 BEYOND = np.array([0.6, 0.7, 0.8, 0.9, 1.0])
 KINDS = {
     "plain": (single, EVERYWHERE),
-    "leftover": (with_newtons, OFF_THE_MIDDLE),
+    "discrepancy": (with_newtons, OFF_THE_MIDDLE),
     "untested deformation": (single, BEYOND),
     "growing noise": (
         lambda: with_effect("heteroscedastic_noise", **GROWING),
@@ -106,7 +106,7 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", slice_of(KINDS, ["leftover"]))
+@pytest.mark.parametrize("kind", slice_of(KINDS, ["discrepancy"]))
 def test_intervals_and_the_rate_of_alarms_hold(kind):
     make, places = KINDS[kind]
     check(streams(make(), 30, 400, places), 400)

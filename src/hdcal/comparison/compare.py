@@ -36,7 +36,7 @@ class Compared(Item):
         "probability of a difference larger than the tolerance"
     )
     case: InstanceOf[Case] = Field(exclude=True)
-    has_leftover: bool = Field(exclude=True)
+    has_discrepancy: bool = Field(exclude=True)
 
     @property
     def tested(self) -> tuple[float, float]:
@@ -155,7 +155,7 @@ def _compared(name, models, draws, apart, tolerance: float | None) -> Compared:
         probability_stiffer=float(np.mean(apart > 0.0) + np.mean(apart == 0.0) / 2.0),
         probability_differs=beyond,
         case=case,
-        has_leftover=any(
+        has_discrepancy=any(
             model.posterior.problem.discrepancy is not None for model in models
         ),
     )

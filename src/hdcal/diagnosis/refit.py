@@ -1,7 +1,7 @@
 """Calibration of the probable hypotheses by NUTS, each with its probability.
 
 Those of 5 % and more are calibrated, whatever the verdict. If the others have more than
-2 % together, the likeliest with a leftover discrepancy stands for them, as it bends
+2 % together, the likeliest with a discrepancy stands for them, as it bends
 wherever the data let it; else the model that knows the stiffness least.
 """
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hdcal.inference.sample import Progress
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
-# without a model with a leftover.
+# without a model with a discrepancy.
 _LEAST_SHARE, _MOST_LEFT_OUT = 0.05, 0.02
 # Rows from which on a model takes minutes and more to calibrate.
 _MOST_ROWS = 5_000
@@ -32,7 +32,7 @@ _MOST_ROWS = 5_000
 class Refits:
     """Calibrated hypotheses that may be used, with probabilities that sum to 1.
 
-    `none` is the plain model, `unknown` that with a leftover gap. `left_out` is the
+    `none` is the plain model, `unknown` that with a discrepancy. `left_out` is the
     probability without a model among these; `failures` say why others cannot be used.
     """
 
@@ -128,5 +128,5 @@ def _name(components: Iterable[str]) -> str:
 
 
 def _parts(name: str) -> frozenset[str]:
-    """Return the effects of a hypothesis, and `unknown` where it has a leftover."""
+    """Return the effects of a hypothesis, and `unknown` where it has a discrepancy."""
     return frozenset(name.split("+")) - {NONE}

@@ -16,44 +16,44 @@ from hdcal.physics.dynamics import Forcing, Oscillator, integrate
 from hdcal.physics.effect import parameters
 from hdcal.physics.theory import Scalar
 from hdcal.prediction.joint import JointModel
-from hdcal.prediction.simulate import gear_leftover
+from hdcal.prediction.simulate import gear_discrepancy
 
-# The leftover of a draw at so many places, up to this multiple of the largest tested
+# The discrepancy of a draw at so many places, up to this multiple of the largest tested
 # deformation either way. A cubic spline between them keeps the integration smooth.
 _PLACES, _REACH = 121, 3.0
 # Sites of a draw: the ends of the spline [mm], and its coefficients, highest first.
-_ENDS, _LEFTOVER = "_leftover_ends", "_leftover"
+_ENDS, _DISCREPANCY = "_discrepancy_ends", "_discrepancy"
 # Draws that are integrated together, and the largest number of their states.
 _CHUNK, _MOST_STATES = 250, 1_000_000
 
 
 def moving_draws(gears: JointModel, seed: int) -> dict[str, np.ndarray]:
-    """Return the draws of one gear, of one calibrated at rest with its leftover."""
+    """Return the draws of one gear, of one calibrated at rest with its discrepancy."""
     # Values of tested members may be many, and are no part of a gear in motion.
     values = {n: v for n, v in gears.draws.items() if n not in MEMBERS.values()}
     if gears.posterior.kind == "dynamic":
         return values
     far = _REACH * float(np.max(np.abs(gears.posterior.case.records.deformation)))
     places = np.linspace(-far, far, _PLACES)
-    spline = CubicSpline(places, gear_leftover(gears, places, seed=seed), axis=1)
+    spline = CubicSpline(places, gear_discrepancy(gears, places, seed=seed), axis=1)
     ends = np.tile(places[[0, -1]], (gears.size, 1))
-    return values | {_ENDS: ends, _LEFTOVER: np.moveaxis(spline.c, 2, 0)}
+    return values | {_ENDS: ends, _DISCREPANCY: np.moveaxis(spline.c, 2, 0)}
 
 
-def _leftover_force(value: Values) -> Callable[[Scalar], Scalar] | None:
+def _discrepancy_force(value: Values) -> Callable[[Scalar], Scalar] | None:
     """Return the force of one draw outside base and effects, zero when unloaded [N]."""
-    if _LEFTOVER not in value:
+    if _DISCREPANCY not in value:
         return None
 
-    def leftover(deformation: Scalar) -> Scalar:
+    def discrepancy(deformation: Scalar) -> Scalar:
         low, high = value[_ENDS]
         width = (high - low) / (_PLACES - 1)
         place = jnp.clip(deformation, low, high) - low
         part = jnp.clip(jnp.floor(place / width), 0, _PLACES - 2).astype(int)
-        return jnp.polyval(value[_LEFTOVER][:, part], place - part * width)
+        return jnp.polyval(value[_DISCREPANCY][:, part], place - part * width)
 
-    unloaded = leftover(0.0)
-    return lambda deformation: leftover(deformation) - unloaded
+    unloaded = discrepancy(0.0)
+    return lambda deformation: discrepancy(deformation) - unloaded
 
 
 def integrate_all(
@@ -105,8 +105,8 @@ def _moved(draws, reading, at, force, times, reach, *, kept):
         )
         stiffness = value["stiffness"] / reading.radial_per_read
         base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
-        leftover = _leftover_force(value)
-        gear = Oscillator(mass, damping, base, effects, reading, at, leftover)
+        discrepancy = _discrepancy_force(value)
+        gear = Oscillator(mass, damping, base, effects, reading, at, discrepancy)
         motion = integrate(gear, force, times, reach)
         return motion.deformation, motion.largest, motion.done, motion.gone
 

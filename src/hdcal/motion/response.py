@@ -40,7 +40,7 @@ class Estimates(Item):
 class Response(Result):
     """The motion under a force, from the unloaded gear, with pointwise bands.
 
-    `looped` is whether the leftover differs between loading and unloading.
+    `looped` is whether the discrepancy differs between loading and unloading.
     """
 
     template = "motion/response.md.j2"

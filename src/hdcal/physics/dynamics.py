@@ -83,7 +83,7 @@ class Oscillator(eqx.Module):
         effects: instantaneous ones.
         reading: how the rig reads.
         temperature: of the gear [°C].
-        leftover: unexplained force [N] at a deformation [mm], or None.
+        discrepancy: unexplained force [N] at a deformation [mm], or None.
     """
 
     mass: Scalar
@@ -92,7 +92,7 @@ class Oscillator(eqx.Module):
     effects: tuple[Effect, ...]
     reading: Reading
     temperature: Scalar
-    leftover: Callable[[Scalar], Scalar] | None = None
+    discrepancy: Callable[[Scalar], Scalar] | None = None
 
     @property
     def stiffness(self) -> Float[Array, ""]:
@@ -130,7 +130,9 @@ class Oscillator(eqx.Module):
         )
         base = replace(self.base, deformation_offset=0.0, force_offset=0.0, sigma=1.0)
         force = predict_reading(base, self.effects, records, self.reading)[0][0]
-        return force if self.leftover is None else force + self.leftover(deformation)
+        return (
+            force if self.discrepancy is None else force + self.discrepancy(deformation)
+        )
 
 
 @jax.jit

@@ -27,7 +27,7 @@ SIZES, ORDINARY = np.geomspace(1e-3, 3.0, 14), 0.1
 NOISES = np.geomspace(0.1, 1.2, 10)
 # Residuals are averaged at so many places.
 KNOTS = 48
-# Part of the tested range over which the bend takes the place of a fitted leftover.
+# Part of the tested range over which the bend takes the place of a fitted discrepancy.
 FADE = 0.03
 # Least sd of the noise as a share of the force range: readings may have been computed;
 # and the least such range [N], where they show none.
@@ -58,7 +58,7 @@ class Bend:
         return (np.asarray(deformation) - self.far) / (self.end - self.far)
 
     def beyond(self, deformation: np.ndarray) -> np.ndarray:
-        """Return the share of a fitted leftover that the bend replaces [-]."""
+        """Return the share of a fitted discrepancy that the bend replaces [-]."""
         over = np.maximum(self.place(deformation) - 1.0, 0.0) / FADE
         return -np.expm1(-(over**2))
 
@@ -148,7 +148,7 @@ def covariance(one: np.ndarray, other: np.ndarray, *, pairs: bool = True) -> np.
 
 @jit
 def _residuals(problem: Problem, values: Values, records: Records):
-    """Return the residual of each row without the leftover [N], and its precision."""
+    """Return residuals without the discrepancy [N], and the precision of each row."""
     mean, noise = predict_rows(problem, values, records, None)
     residual = records.force - mean
     return residual, row_precision(residual, with_rounding(noise, problem.step))

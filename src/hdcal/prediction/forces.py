@@ -61,7 +61,7 @@ def force_of(
     moved: Float[Array, "*n"] | float = 0.0,
     quantity: Quantity | Literal["gear"] = "reading",
 ) -> tuple[Float[Array, " n"], Noise]:
-    """Compute mean force and noise [N] of one draw, without the leftover discrepancy.
+    """Compute mean force and noise [N] of one draw, without the discrepancy.
 
     The factor is the stiffness relative to the tested gear's, `moved` the radial
     deformation that a warmer frame gains [mm]. A `reading` has the zero of the force
@@ -92,7 +92,7 @@ def forces_of_draws(
     path: Records,
     factor: Float[Array, "draw node n"],
     moved: Float[Array, "draw n"],
-    leftover: Float[Array, " asked"],
+    share: Float[Array, " asked"],
     *,
     quantity: Quantity | Literal["gear"],
     asked: int,
@@ -100,17 +100,17 @@ def forces_of_draws(
     """Compute the force of every draw, its slope by the stiffness, and the noise.
 
     The last rows of the path are the conditions asked for. Factor and `moved` are as in
-    `force_of`; the leftover is the share of the fitted discrepancy that acts.
+    `force_of`; `share` is the part of the fitted discrepancy that acts.
 
     Returns:
         Force (draw, node, asked) and its derivative by the factor [N], logarithms of
         the shares of the components of the noise (draw, node, component), their sds
-        (draw, node, component, asked) [N], and the leftover discrepancy in the force
+        (draw, node, component, asked) [N], and the discrepancy in the force
         (draw, asked) [N].
     """
 
     def of_draw(value, factor, moved):
-        left = leftover * fitted_leftover(problem, value, path, quantity)[-asked:]
+        left = share * fitted_discrepancy(problem, value, path, quantity)[-asked:]
 
         def force(factor):
             mean, noise = force_of(
@@ -130,10 +130,10 @@ def forces_of_draws(
     return jax.vmap(of_draw)(draws, factor, moved)
 
 
-def fitted_leftover(
+def fitted_discrepancy(
     problem: Problem, value: Values, rows: Records, quantity
 ) -> Float[Array, " n"]:
-    """Return the fitted leftover discrepancy of one draw [N], zero without one.
+    """Return the fitted discrepancy of one draw [N], zero without one.
 
     It is constant beyond the tested deformation; that of a gear is counted from its
     free shape.

@@ -21,7 +21,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.models import Model, Models, models_of
 
-# Sites of models with a leftover discrepancy and with correlated noise, null elsewhere.
+# Sites of models with a discrepancy and with correlated noise, null elsewhere.
 _AT_ZERO = ("gap_sd", "gap_weights", CORRELATION)
 # Drifts of the rig with temperature, by the effect whose prior states them.
 DRIFTS = {"zero_drift": "thermal_zero_drift", "frame_drift": "thermal_expansion"}

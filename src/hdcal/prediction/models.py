@@ -69,8 +69,8 @@ class Model:
         """Return mean and sd of the bend of each draw [N], (draw, row) each.
 
         As `JointModel.bend`. Inside the tested range both bends describe the same
-        residuals, each best near its end. A fitted leftover covers that range: beside
-        it the bend acts beyond.
+        residuals, each best near its end. A fitted discrepancy covers that range: then
+        the bend acts beyond it.
         """
         below, above = self.bends
         upper = np.clip(above.place(place), 0.0, 1.0)
@@ -84,7 +84,7 @@ class Model:
         )
 
     def beyond(self, place: np.ndarray) -> np.ndarray:
-        """Return the share of a fitted leftover that the bend replaces, (row,)."""
+        """Return the share of a fitted discrepancy that the bend replaces, (row,)."""
         below, above = self.bends
         return np.maximum(above.beyond(place), below.beyond(place))
 

@@ -1,8 +1,8 @@
 """Forces of future members of a population, simulated from posterior draws.
 
 Every answer about a future force comes from here: bands and margins use `simulate`,
-designs and studies `gear_forces`, responses `gear_leftover`; streams that are tracked
-have the same bends, scores and drifts.
+designs and studies `gear_forces`, responses `gear_discrepancy`; streams that are
+tracked have the same bends, scores and drifts.
 """
 
 from functools import lru_cache
@@ -86,7 +86,7 @@ def simulate(
         name: np.broadcast_to(values[:, None], within.shape)
         for name, values in common.items()
     }
-    common |= {"bend": at.loading * bend, "leftover": at.loading * left, **drift}
+    common |= {"bend": at.loading * bend, "discrepancy": at.loading * left, **drift}
     return Members(
         share.reshape(count, -1),
         np.moveaxis(mean, 3, 1).reshape(count, at.size, -1),
@@ -108,12 +108,12 @@ def gear_forces(model: JointModel, at: Conditions, *, seed: int = 0) -> np.ndarr
     return _forces(model, at, factor, moved, acting)[0][:, 0] + bend
 
 
-def gear_leftover(
+def gear_discrepancy(
     model: JointModel, deformation: np.ndarray, *, seed: int = 0
 ) -> np.ndarray:
     """Return the force of a gear outside model and effects [N], (draw, row).
 
-    The bend, and the fitted leftover as the mean of loading and unloading, by the
+    The bend, and the fitted discrepancy as the mean of loading and unloading, by the
     deformation from the free shape, per mm as read, (row,).
     """
     score, case = draw_scores(model.size, seed), model.posterior.case
@@ -173,7 +173,7 @@ def draw_scores(count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def _bend(model: JointModel, at: Conditions, score) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bend of each draw [N], and the share of the fitted leftover that acts.
+    """Return the bend of each draw [N], and the share of the discrepancy that acts.
 
     Shapes (draw, row) and (row,). A bend that is drawn from its prior is drawn along
     the direction of loading, so that mirrored data have the mirrored answer.

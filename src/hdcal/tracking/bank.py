@@ -2,7 +2,7 @@
 
 Under draw i a reading is y = m_i + s_i (f − 1) + b + c_i·u + e with mean m_i, slope s_i
 and columns c_i of the draw. Stiffness factor f, shift b of the zero and coefficients u
-of a leftover discrepancy and of untested conditions are normal given the noise
+of a discrepancy and of untested conditions are normal given the noise
 variance, which is inverse gamma: each row updates them exactly. A draw is weighted by
 the density that it gave the rows.
 
@@ -46,7 +46,7 @@ class RowForces(NamedTuple):
 
     The excess is the variance of a reading beyond that of one without load [N²]; the
     extrapolation the sd of the error at untested conditions, with the sign of the side
-    on which these lie; the columns are those of the coefficients of the leftover.
+    on which these lie; the columns are those of the coefficients of the discrepancy.
     """
 
     mean: Float[Array, "n draw"]

@@ -23,7 +23,7 @@ from hdcal.tracking.bank import CELLS, Bank, RowForces
 
 # At least this much probability must lie on models that a stream can follow.
 _LEAST_FOLLOWED = 0.5
-# Parts of a leftover discrepancy below this share of the noise are left out.
+# Parts of a discrepancy below this share of the noise are left out.
 _SMALL = 0.03
 # Site of the sd of the zero from one mounting to the next [N].
 MOUNTING = "run_offset_sd"
@@ -42,7 +42,7 @@ _PAIRS = 30.0
 class StreamDraws:
     """Draws of the models of a case that a stream can follow, joined.
 
-    The weights of a leftover discrepancy among the values are their mean; scores of
+    The weights of a discrepancy among the values are their mean; scores of
     unit variance (draw, c) times parts (weight, c) are the distances from it. The bend
     of each draw has the level of its law and a normal score, (draw, 2).
     """
@@ -130,15 +130,15 @@ def draws_of(models: Models) -> tuple[StreamDraws, list[str]]:
     scores, parts = np.empty((size, 0)), np.empty((0, 0))
     if problem.discrepancy is not None:
         at = np.asarray(case.records.deformation)
-        mean, scores, parts = _leftover(problem.discrepancy, values, at)
+        mean, scores, parts = _weights(problem.discrepancy, values, at)
         values |= {"gap_weights": mean}
     score = draw_scores(size, 0)
     bend = np.stack([score["law"], score["bend"]], axis=1)
     return StreamDraws(whole, values, scores, parts, bend), notes
 
 
-def _leftover(discrepancy: Discrepancy, values: Values, at: np.ndarray):
-    """Return mean weights of the leftover discrepancy, its scores and their parts."""
+def _weights(discrepancy: Discrepancy, values: Values, at: np.ndarray):
+    """Return mean weights of the discrepancy, its scores and their parts."""
     weights = values["gap_weights"]
     fitted = np.any(weights != 0.0, axis=1)
     mean = fitted[:, None] * weights[fitted].mean(axis=0)
@@ -178,7 +178,7 @@ def _force(
         columns = jnp.empty((len(at), 0))
         return RowForces(mean, slope, excess, drift, columns)
     weights = value["gap_weights"]
-    # A stream does not show the direction: the loop of the leftover is noise.
+    # A stream does not show the direction: the loop of the discrepancy is noise.
     middle, up = (
         (1.0 - beyond)[:, None] * problem.discrepancy.columns(at, way + 0.0 * at)
         for way in (0.0, 1.0)

@@ -126,7 +126,7 @@ def predict(
 def _quantiles(model: JointModel, at: Conditions, tails, seed: int):
     """Return quantiles [N] as arrays (tail, row).
 
-    Of the mean, of the mean without a fitted leftover discrepancy, of a new reading,
+    Of the mean, of the mean without a fitted discrepancy, of a new reading,
     (3, row) each; and the median of the model alone, (row,).
     """
     # The mean is that of the tested gears and mountings, a new reading of a new one.
@@ -141,7 +141,7 @@ def _quantiles(model: JointModel, at: Conditions, tails, seed: int):
     new = members.quantile(level)
     new = new + float(model.problem.step) * (rounding - 0.5)[:, None]
     mean = tested.centre
-    physics = mean - tested.common["leftover"]
+    physics = mean - tested.common["discrepancy"]
     straight = physics - tested.common["bend"]
     return (
         over_draws(at.loading * mean, tails),

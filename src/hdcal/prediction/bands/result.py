@@ -16,7 +16,7 @@ from hdcal.report.result import Result
 class Bands(Result):
     """Equal-tailed bands of the force as read, with one entry per row.
 
-    The band of the mean is without a fitted leftover; with it, it is NaN if none was
+    The band of the mean is without a fitted discrepancy; with it, it is NaN if none was
     fitted. That of one new reading is on a new run and a new specimen where these were
     fitted, with the rounding of the rig. `straight_N` is the median of the model
     without the bend that the readings leave possible, `beyond_tested` the largest

@@ -34,7 +34,7 @@ _INPUTS: dict[str, tuple[str, str, str, str]] = {
     "load_height": ("tolerance of the load height", "N", "rectangular", ""),
     "cause": ("which effect acts", "N", "discrete", "stiffness"),
     "bend": ("curvature that the readings do not exclude", "N", "posterior", "bend"),
-    "leftover": ("fitted discrepancy", "N", "posterior", "bend"),
+    "discrepancy": ("fitted discrepancy", "N", "posterior", "bend"),
     "zero_drift": ("zero drift of the gauge with temperature", "N", "normal", ""),
     "frame_drift": ("expansion of the rig with temperature", "mm", "normal", ""),
     "alpha": ("loss of modulus per kelvin", "1/K", "prior", ""),
