@@ -22,9 +22,9 @@ _SHOWN = 6.0
 NEGLIGIBLE, DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
 CARRIED = 0.5
-# Squared cosine of the angle between what the base model leaves of two effects from
-# which they are one class: within 18 degrees.
-ALIKE = 0.9
+# Cosine of the angle between what the base model leaves of two effects from which they
+# are one class: within 18 degrees. One that can only bend the other way is at 180.
+ALIKE = 0.95
 # An effect is excluded by another one at odds of a hundred (Jeffreys, Theory of
 # Probability, 1961: decisive). Effects of less probability lead no class.
 _EXCLUDED = _LEAST = 0.01
@@ -36,28 +36,32 @@ def classes(
     """Return classes of effects on the mean reading, each with its likeliest first.
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
-    all that the readings do not exclude given it and whose curves, each fitted alone,
-    coincide with it. An effect is in one class at most.
+    all that the readings do not exclude in its place and whose curves, each fitted
+    alone, coincide with it. An effect is in one class at most.
     """
-    chance = dict.fromkeys(searched.table.names[:-1], 0.0)
-    for key, each in posterior.items():
-        for name in chance.keys() & {*key}:
-            chance[name] += float(each.sum())
-    left = sorted(chance, key=lambda name: -chance[name])
+    keys = [{*key} for key in posterior]
+    weights = np.array([each.sum() for each in posterior.values()])
+
+    def chance(name: str, without: Sequence[str] = ()) -> float:
+        """Return the probability of an effect, in hypotheses without some others."""
+        kept = [name in key and key.isdisjoint(without) for key in keys]
+        return float(weights[kept].sum())
+
+    left = sorted(searched.table.names[:-1], key=lambda name: -chance(name))
     found = []
-    while left and chance[left[0]] > _LEAST:
+    while left and (most := chance(left[0])) > _LEAST:
         leader = left.pop(0)
-        keys = [key for key in posterior if leader in key]
-        key = max(keys, key=lambda key: posterior[key].sum())
-        curve, least = _direction(searched, key, leader), _EXCLUDED * chance[leader]
-        alike = [
-            name
-            for name in left
-            if chance[name] >= least
-            and (curve @ _direction(searched, (name,), name)) ** 2 >= ALIKE
-        ]
-        left = [name for name in left if name not in alike]
-        found.append((leader, *alike))
+        key = max(
+            (key for key in posterior if leader in key),
+            key=lambda key: posterior[key].sum(),
+        )
+        group, curve = [leader], _direction(searched, key, leader)
+        for name in left:
+            possible = chance(name, without=group) >= _EXCLUDED * most
+            if possible and curve @ _direction(searched, (name,), name) >= ALIKE:
+                group.append(name)
+        left = [name for name in left if name not in group]
+        found.append(tuple(group))
     return found
 
 
