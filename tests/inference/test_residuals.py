@@ -37,6 +37,7 @@ from hdcal.inference.force_model.serial_correlation import (
 RECORDS = replace(cycles(96), time=np.arange(96.0) ** 2)
 SHAPES = shapes_of(RECORDS, 20.0)
 CORRELATED = Correlated(previous_rows(RECORDS), rig_priors()[CORRELATION])
+WIDE = Prior("beta", (0.5, 1.5))
 ROWS = 60
 X = np.linspace(0.02, 0.54, ROWS)
 
@@ -76,6 +77,22 @@ def whitened(error: np.ndarray) -> Whitened:
     """Return what an offset and a slope leave of the error, in noise sds."""
     absorbed = np.column_stack([np.ones(len(error)), RECORDS.deformation])
     return Whitened(error, absorbed, SHAPES)
+
+
+def test_a_shape_that_the_noise_would_have_to_cancel_is_not_found():
+    """Smooth waves resemble a random walk, in which the first steps are all."""
+    row, rng = np.arange(150), np.random.default_rng(0)
+    x = np.linspace(0.0, 1.0, 150)
+    x += 0.15 * np.maximum(0.08 - x, 0.0)
+    error = 2.0 * np.sin(18.0 * x) - 5.0 * np.exp(-row / 1.5)
+    error += 0.3 * rng.normal(size=150)
+    absorbed = np.column_stack([x, np.ones(150)])
+    shapes = {"order": (row / 150.0, "", ""), "bend": (x**2, "", "")}
+    data = Whitened(error, absorbed, shapes)
+    assert not find_structure(data, np.ones(150), Correlated(row - 1, WIDE))
+    bent = replace(data, residual=error + 40.0 * x**2)
+    found = find_structure(bent, np.ones(150), Correlated(row - 1, WIDE))
+    assert [each.name for each in found] == ["bend"]
 
 
 def shapes_in(error, noise=None) -> list[str]:

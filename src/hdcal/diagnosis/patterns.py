@@ -107,6 +107,8 @@ def _over_direction(
 ) -> Iterator[Contrast]:
     """Yield loops of even width, sudden or gradual, and loops that widen or narrow."""
     sense, ways = np.asarray(records.sense, float), ("lower", "higher")
+    if np.ptp(sense) == 0.0:
+        return
     down, than = "on unloading", "on loading"
     if both:
         down, than = "while the {displacement} decreases", "while it increases"

@@ -173,7 +173,9 @@ def _tests(
 
     Where neighbours may be correlated the p value given ρ is averaged over the
     posterior of ρ with that column in the model: a bend alone resembles correlation.
-    There are no tests where too few rows are left.
+    There are no tests where too few rows are left. A column whose coefficient leaves
+    larger residuals than there were is not in the readings: the noise would have to
+    cancel it, which a wrong model of the noise can suggest.
     """
     size, free = basis.shape[1], len(residual) - basis.shape[1] - 1
     units = {}
@@ -206,5 +208,6 @@ def _tests(
             float(probability @ given_rho)
             for given_rho in (2.0 * special.stdtr(free, -t), cross / square, sd)
         )
-        tests.append(_Test(name, p, coefficient, sd, unit))
+        removed = coefficient * (2.0 * float(unit @ error) - coefficient)
+        tests.append(_Test(name, p if removed > 0.0 else 1.0, coefficient, sd, unit))
     return tests
