@@ -60,7 +60,7 @@ def test_of_two_tables_one_has_to_be_named(folder):
 
 
 def test_what_is_no_workbook_of_readings_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no sheet contains a table"):
+    with pytest.raises(InputError, match="no sheet contains 5 readings"):
         read_case(book(tmp_path, notes=[("nothing", "here")]))
     path = tmp_path / "other.xlsx"
     with zipfile.ZipFile(path, "w") as archive:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # A longer word may wrap, so that the numbers have room.
 _LONGEST = 30
+# Blanks between columns.
+_GAP = 2
 
 
 class _Heading(Heading):
@@ -38,20 +40,26 @@ class _Table(TableElement):
     def __rich_console__(
         self, console: Console, options: ConsoleOptions
     ) -> RenderResult:
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+        look = {"box": box.SIMPLE_HEAD, "padding": (0, _GAP - 1, 0, 0)}
+        table = Table(**look, pad_edge=False, show_edge=False)
         rows = [row.cells for row in self.body.rows] if self.body else []
         header = self.header.row.cells if self.header and self.header.row else []
-        for i, cell in enumerate(header):
-            texts = [row[i].content.plain for row in rows if i < len(row)]
+        columns = [[row[i].content.plain for row in rows] for i in range(len(header))]
+        widest = [max(map(len, column), default=0) for column in columns]
+        tight = sum(widest) + _GAP * len(widest) > options.max_width
+        for cell, texts, width in zip(header, columns, widest, strict=True):
             right, title = cell.justify == "right", cell.content.plain
-            words = not any(" " in text or len(text) > _LONGEST for text in texts)
-            whole = right or words
+            words = width <= _LONGEST and not any(" " in text for text in texts)
+            # A column of words wraps where numbers would lose digits.
+            whole = right or (words and not tight)
             if whole and title:
                 # A column that does not wrap would not wrap its title either.
-                width = max(map(len, [*texts, *title.split()]))
-                title = fill(title, width, break_long_words=False)
+                most = max(width, *map(len, title.split()))
+                title = fill(title, most, break_long_words=False)
             justify = "right" if right else "left"
-            table.add_column(Text(title), justify=justify, no_wrap=whole)
+            table.add_column(
+                Text(title), justify=justify, no_wrap=whole, overflow="fold"
+            )
         for cells in rows:
             table.add_row(*(cell.content for cell in cells))
         yield table

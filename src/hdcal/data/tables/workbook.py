@@ -31,8 +31,8 @@ def sheet_grid(
     if sheet is not None:
         return sheets[sheet], [], sheet if {*likely} - {sheet} else ""
     if not likely:
-        words = f"no sheet contains a table of readings: {names}"
-        remedy = f"Write at least {_FEWEST} rows of readings below headers. Formulas "
+        words = f"no sheet contains {_FEWEST} readings or more: {names}"
+        remedy = "Write them in rows below headers. Formulas "
         remedy += "are read only if a spreadsheet program has saved their values"
         findings.refuse(words, remedy)
     if len(likely) > 1:
