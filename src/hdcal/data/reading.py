@@ -25,8 +25,8 @@ _NEARBY = f"the gear file is the {GEAR_NAME} next to the data"
 # The note where no gear file was named, and none lies next to the data.
 UNSIZED = (
     f"{ASSUMED}without a gear file the part is treated as a spring: the result is its "
-    "stiffness, without K. For K state the sizes in a gear file: the file "
-    f"{GEAR_NAME} in the folder of the data, or one that is named"
+    "stiffness, without K. For K state the sizes in a gear file: "
+    f"{GEAR_NAME} in the folder of the data, or --gear FILE.toml"
 )
 
 _WARMTH = (

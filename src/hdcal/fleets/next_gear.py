@@ -19,7 +19,7 @@ from hdcal.prediction.conditions import far_findings
 from hdcal.report.item import Interval, Item, Probability, quantity
 
 # Shares of future gears, and the confidence, of the bounds.
-_CONTENTS, _CONFIDENCE = (0.9, 0.99), 0.95
+_CONTENTS, _CONFIDENCE = (0.9, 0.95, 0.99), 0.95
 
 
 class Bounds(Item):

@@ -50,8 +50,8 @@ def track(console: Console, known, alarm_rows):
         discard(sys.stdout)
     due = tracker.readings / alarm_rows
     console.words(
-        f"{tracker.rows} rows, {bad} of them not readable; {tracker.alarms} alarms; "
-        f"{digits(due)} false alarms are expected without a change"
+        f"rows: {tracker.rows}, not readable: {bad}, alarms: {tracker.alarms}, false "
+        f"alarms expected without a change: {digits(due)}"
     )
     if tracker.alarms:
         words = (

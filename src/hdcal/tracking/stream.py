@@ -46,6 +46,8 @@ def _attempt(reading: type[StreamReading], line: bytes) -> StreamReading | str:
     try:
         return reading.model_validate_json(line)
     except ValidationError as error:
+        if error.errors()[0]["type"] == "json_invalid":
+            return "the line is not a JSON object"
         problems = [(*each["loc"], each["msg"]) for each in error.errors()]
         return "; ".join(": ".join(map(str, problem)) for problem in problems)
 

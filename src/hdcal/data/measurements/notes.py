@@ -97,8 +97,8 @@ def resets_note(motion: Motion, rows: np.ndarray, units: Quantities) -> Iterator
         few = shortened(rows[[*motion.resets]].tolist(), _MOST_ROWS)
         yield (
             f"the {units.displacement} returns over most of its range in one step "
-            f"(row {few}), which does not count as measured unloading. If a new "
-            "mounting begins there, label it in a column `run`"
+            f"(row {few}), which is not taken for unloading. If a new mounting begins "
+            "there, label it in a column `run`"
         )
 
 

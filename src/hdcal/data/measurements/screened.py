@@ -60,7 +60,8 @@ def screened(
         if wanted.unit == STRAIGHT and result.straight is None:
             words = "is straight, but the data contain several runs, or cycles without "
             words += "straight movements"
-            raise InputError([Finding("range", words, FORM)])
+            remedy = "Give its ends, as 0.1:0.6 in mm or 10%:40% of the largest force"
+            raise InputError([Finding("range", words, remedy)])
         result = in_range(result, wanted, run, units)
     reach, gears = result.working_range, measured["specimen"]
     found = tuple(

@@ -226,6 +226,9 @@ class _Chooser:
             words = f"no header states the {quantity}; it may be {names[0]}"
         remedy = f"Name the column by its number ({numbers}): "
         remedy += f"`columns` '{quantity}={places[0] + 1}'"
+        if len(places) > 1:
+            remedy += ". If each is of another gear, put them below each other in one "
+            remedy += "column, and its gear in another"
         self._add(words, remedy, places[min(1, len(places) - 1)])
 
     def _ask_unit(self, quantity: str, place: int) -> None:
