@@ -60,12 +60,19 @@ def refit(
 ) -> Refits:
     """Calibrate every hypothesis that is probable enough; probabilities sum to 1.
 
+    An effect can be probable without the readings that its calibration needs, as one of
+    the speed where a loop was read at one speed. Another model carries its probability.
     Progress is that of one calibration after the other.
     """
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
-    probabilities = {_name(key): chance for key, chance in hypotheses.items()}
+    lacking = {n for n, each in library.items() if each.needs - case.records.known}
+    probabilities = {
+        _name(key): chance
+        for key, chance in hypotheses.items()
+        if lacking.isdisjoint(key)
+    }
 
     def calibrated(name: str) -> Posterior:
         parts = _parts(name)
