@@ -8,7 +8,8 @@ from posteriors import beside, single
 from rigs import cycles, make_case
 
 from hdcal.diagnosis.diagnose import _stiffness
-from hdcal.diagnosis.refit import Refits, rows_to_calibrate, weighed
+from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate, weighed
+from hdcal.physics.registry import EFFECTS
 
 
 def fits(chances: dict, failing=(), widths=None):
@@ -72,6 +73,26 @@ def test_probabilities_of_the_models(case: str):
     assert found.left_out.probability == pytest.approx(1.0 - before, abs=1e-9)
     failed = given[1] if len(given) > 1 else ()
     assert sorted(names) == sorted({*shares, *failed})
+
+
+def test_effects_without_readings_for_a_calibration_are_carried_by_another(monkeypatch):
+    """A loop that was read at one speed may be viscous, which no calibration takes."""
+    case, names = make_case(cycles(48)), []
+    assert "rates" not in case.records.known
+
+    def calibrated(_, *, effects, with_gap, **__):
+        names.append((effects, with_gap))
+        draws = {"stiffness": np.array([199.0, 201.0])}
+        return SimpleNamespace(usable=True, draws=draws, reasons=())
+
+    monkeypatch.setattr("hdcal.calibration.calibrate.calibrate", calibrated)
+    chances = {("coulomb_friction",): 0.6, ("viscous_damping",): 0.3, (): 0.1}
+    found = refit(case, chances, EFFECTS, 0, None)
+    friction = ("coulomb_friction",)
+    assert names == [(friction, False), ((), False), (friction, True)]
+    assert found.left_out is not None
+    assert found.left_out.probability == pytest.approx(0.3)
+    assert found.left_out.counted_as == "coulomb_friction+unknown"
 
 
 def test_nothing_is_left_where_all_calibrations_fail():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import rich, simulated
+from diagnosis_cases import judged, rich, simulated
 from rigs import make_records
 
 from hdcal.data.case import Case
@@ -90,6 +90,24 @@ def test_loading_or_shape_separates_yield_from_saturation(softening, path, alike
     assert ("force_saturation" in cause.members) == alike
     excluded = found.which.inclusion["force_saturation"] < 0.01
     assert excluded != alike
+
+
+def test_a_bend_upwards_is_in_no_class_with_one_downwards():
+    records = make_records(np.linspace(0.02, 0.54, 40))
+    bend = {"progressive_stiffening": {"slope": 1.0}}
+    found = decide(simulated(records, bend, seed=1))
+    members = class_of(found, "progressive_stiffening").members
+    assert "displacement_nonlinearity" in members
+    assert not {"force_saturation", "seating_slack"} & {*members}
+
+
+def test_a_ramp_has_no_loop():
+    """Of a loop that widens it shows the few readings below zero, of any size."""
+    case = simulated(make_records(np.linspace(-0.01, 0.54, 150)), seed=4)
+    force = np.array(case.records.force)
+    force[:3] -= 4.0
+    found = judged(with_force(case, force))
+    assert not [seen for seen in found.seen if seen.covariate == "direction"]
 
 
 def test_a_withheld_effect_is_outside():

@@ -15,6 +15,7 @@ from hdcal.report.charts.chart_spec import Chart, Line, Panel
 from hdcal.report.item import Draws, Interval, Item, quantity
 from hdcal.report.result import Result
 from hdcal.report.table_files import columns_csv
+from hdcal.report.terminal_text import _Markdown, drawn
 from hdcal.report.words import digits, number
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"
@@ -195,3 +196,15 @@ def test_numbers_stay_whole_in_a_narrow_terminal(long: str):
 def test_everyday_numbers_have_no_exponent(value: float, count: int, text: str):
     assert digits(value, count) == text
     assert number(20_660.0) == "20660" and number(209.3).endswith("209.3")
+
+
+@pytest.mark.parametrize("width", [40, 57, 58, 110])
+def test_no_number_of_a_table_is_cut_in_a_narrow_terminal(width: int):
+    name, *cells = "probe_with_a_long_name_1", "2.786e+06", "2.648e+06 … 2.947e+06"
+    table = f"| part | N/mm | 95 % |\n|---|---:|---:|\n| {name} | {' | '.join(cells)} |"
+    lines = drawn([_Markdown(table)], width).splitlines()
+    row = next(line for line in lines if cells[0] in line)
+    assert cells[1] in row and max(map(len, lines)) <= width
+    # A name wraps where it must, and is whole if there is room.
+    assert name.startswith(row.split()[0]) and "…" not in row.replace(cells[1], "")
+    assert (name in row) == (width >= 58)

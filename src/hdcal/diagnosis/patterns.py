@@ -106,15 +106,15 @@ def _over_direction(
     records: Records, x: np.ndarray, *, both: bool
 ) -> Iterator[Contrast]:
     """Yield loops of even width, sudden or gradual, and loops that widen or narrow."""
-    sense, ways = np.asarray(records.sense, float), ("lower", "higher")
-    if np.ptp(sense) == 0.0:
+    # A few steps back between readings are no measured unloading.
+    if "unloading" not in records.known:
         return
+    sense, ways = np.asarray(records.sense, float), ("lower", "higher")
     down, than = "on unloading", "on loading"
     if both:
         down, than = "while the {displacement} decreases", "while it increases"
     words = f"the {{load}} is {{size}} {{way}} {down} than {than}"
-    cells = loop_cells(records, _REACHES) if "unloading" in records.known else []
-    for column in (sense, *cells):
+    for column in (sense, *loop_cells(records, _REACHES)):
         yield Contrast("direction", column, ways, words, False)
     words = (
         f"the {{load}} {down} is {{way}} than {than}, increasingly with the "

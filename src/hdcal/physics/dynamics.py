@@ -130,9 +130,9 @@ class Oscillator(eqx.Module):
         )
         base = replace(self.base, deformation_offset=0.0, force_offset=0.0, sigma=1.0)
         force = predict_reading(base, self.effects, records, self.reading)[0][0]
-        return (
-            force if self.discrepancy is None else force + self.discrepancy(deformation)
-        )
+        if self.discrepancy is not None:
+            force = force + self.discrepancy(deformation)
+        return force
 
 
 @jax.jit

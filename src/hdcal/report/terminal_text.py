@@ -45,17 +45,18 @@ class _Table(TableElement):
         rows = [row.cells for row in self.body.rows] if self.body else []
         header = self.header.row.cells if self.header and self.header.row else []
         columns = [[row[i].content.plain for row in rows] for i in range(len(header))]
-        widest = [max(map(len, column), default=0) for column in columns]
-        tight = sum(widest) + _GAP * len(widest) > options.max_width
-        for cell, texts, width in zip(header, columns, widest, strict=True):
+        widths = [
+            _needed(cell.content.plain, texts, numbers=cell.justify == "right")
+            for cell, texts in zip(header, columns, strict=True)
+        ]
+        tight = sum(widths) + _GAP * (len(widths) - 1) > options.max_width
+        for cell, texts, width in zip(header, columns, widths, strict=True):
             right, title = cell.justify == "right", cell.content.plain
-            words = width <= _LONGEST and not any(" " in text for text in texts)
             # A column of words wraps where numbers would lose digits.
-            whole = right or (words and not tight)
+            whole = right or (not tight and max(map(len, texts), default=0) <= width)
             if whole and title:
                 # A column that does not wrap would not wrap its title either.
-                most = max(width, *map(len, title.split()))
-                title = fill(title, most, break_long_words=False)
+                title = fill(title, width, break_long_words=False)
             justify = "right" if right else "left"
             table.add_column(
                 Text(title), justify=justify, no_wrap=whole, overflow="fold"
@@ -63,6 +64,13 @@ class _Table(TableElement):
         for cells in rows:
             table.add_row(*(cell.content for cell in cells))
         yield table
+
+
+def _needed(title: str, texts: list[str], *, numbers: bool) -> int:
+    """Return the width of a column whose numbers are whole, and its words if short."""
+    parts = texts if numbers else [word for text in texts for word in text.split()]
+    widest = max(map(len, [*parts, *title.split()]), default=0)
+    return widest if numbers else min(widest, _LONGEST)
 
 
 class _Markdown(Markdown):
