@@ -94,6 +94,7 @@ def test_steps_are_ordered_and_each_has_a_sentence():
     found = calibration_of(replace(posterior, checks=(check,)))
     assert found.steps == ("implausible", *plain.steps)
     assert found.next_step and found.next_step.startswith("Check the units")
+    assert "discrepancy" in calibration_of(with_discrepancy()).steps
 
 
 def test_a_shape_of_the_residuals_is_in_headline_and_steps():

@@ -140,10 +140,21 @@ def test_too_coarse_a_step_for_sheppard_fails(step, exact, outcome):
     [(0.01, 60, "passed"), (0.4, 60, "note"), (0.8, 60, "warning"), (0.8, 600, "note")],
 )
 def test_a_correlation_is_reported_by_what_it_leaves(rho, rows, outcome):
-    found = correlation_check({CORRELATION: np.full((2, 50), rho)}, rows)
+    priors = {CORRELATION: Prior("uniform", (0.0, 0.95))}
+    found = correlation_check({CORRELATION: np.full((2, 50), rho)}, rows, priors)
     assert found.outcome == outcome
     # (60 − 58 ρ) / (1 + ρ) independent readings.
     assert ("some 8 independent" in found.words) == (outcome == "warning")
+
+
+def test_a_correlation_at_the_end_of_its_prior_asks_for_a_diagnosis():
+    """There the errors last longer than noise does: they are a curve or a loop."""
+    draws = {CORRELATION: np.linspace(0.9295, 0.93, 100).reshape(2, 50)}
+    for end, asks in ((0.93, True), (0.99, False)):
+        priors = {CORRELATION: Prior("uniform", (0.0, end))}
+        words = correlation_check(draws, 60, priors).words
+        assert ("diagnose" in words) == asks
+        assert ("0.93 to 0.93" in words) != asks
 
 
 def test_what_a_lognormal_prior_lost_counts_in_logarithms():

@@ -1,5 +1,6 @@
 """Densities, structures, fits and checks have the numbers of a reference."""
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -189,7 +190,7 @@ def test_convergence_and_checks_are_those_of_the_reference():
             *mixing_checks(found, 4),
             conflict_check(draws, priors),
             bound_check(draws, priors),
-            *(correlation_check(draws, rows) for rows in (8, 60, 2000)),
+            *(correlation_check(draws, rows, priors) for rows in (8, 60, 2000)),
             *(rounding_check(s, False, draws["sigma"]) for s in (0.1, 2.0, 4.0)),
         )
         numbers[f"{kind} checks"] = [float(OUTCOMES.index(c.outcome)) for c in checks]
@@ -200,20 +201,21 @@ def test_convergence_and_checks_are_those_of_the_reference():
 
 
 @pytest.mark.parametrize("sampler", ("nuts", "importance"))
-def test_samplers_find_the_moments_of_the_reference(sampler: str):
+def test_samplers_find_the_quartiles_of_the_reference(sampler: str):
+    """Quartiles, as σ has a long tail; the reference is of 80,000 draws of NUTS."""
     _, problem = model_of("line")
     whitening = laplace.fit(problem)
+    draws = 20_000 if os.environ.get("HDCAL_RENEW") == "1" else 2000
     if sampler == "nuts":
-        values = sample(problem, whitening, 3, warmup=300, draws=1000).values
+        values = sample(problem, whitening, 3, warmup=300, draws=draws).values
     else:
-        found = sample_by_importance(problem, whitening, 3, chains=4, draws=1000)
+        found = sample_by_importance(problem, whitening, 3, chains=4, draws=draws)
         assert found is not None and found.shape < 0.7
         values = found.values
-    centre = laplace.values_at(problem, whitening.centre)
-    # One reference for both: of 4000 draws of which at least a fourth are effective.
-    numbers = {
-        name: [float(np.mean(v - centre[name]) / np.std(v)), float(np.log(np.std(v)))]
-        for name, v in values.items()
-        if name in problem.priors
-    }
-    assert_reference(__file__, "moments", numbers, abs=0.12)
+    numbers = {}
+    for name in problem.priors.keys() & values.keys():
+        low, middle, high = np.quantile(values[name], [0.25, 0.5, 0.75])
+        shift = middle - laplace.values_at(problem, whitening.centre)[name]
+        numbers[name] = [float(shift / (high - low)), float(np.log(high - low))]
+    # Of 8000 draws a fifth are effective at least: their error is 0.04 at most.
+    assert_reference(__file__, "quartiles", numbers, abs=0.12)

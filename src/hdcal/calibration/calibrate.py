@@ -102,7 +102,9 @@ def calibrate(
     stiffness, records = found.values["stiffness"], case.records
     checks = [
         rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
-        correlation_check(found.values, len(records.force), form.why_independent),
+        correlation_check(
+            found.values, len(records.force), priors, form.why_independent
+        ),
     ]
     if not requested and with_gap is None:
         # An effect or a requested discrepancy changes the stiffness.

@@ -186,6 +186,8 @@ def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
         yield "several specimens"
     if INDEPENDENT in warned and "unloading" in known:
         yield "strong correlation"
+    if posterior.settings["with_gap"]:
+        yield "discrepancy"
     yield from (shape.name for shape in left.structure)
     yield from (shape.name for shape in left.noise if shape.name != WILD)
     if NOISY in warned and not left.structure:

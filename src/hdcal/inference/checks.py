@@ -25,6 +25,8 @@ MIN_BFMI = 0.3
 COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
+# Parameters in sentences, where their name is not that of the field.
+_WORDS = {"sigma": "noise sd", CORRELATION: "correlation of neighbouring readings"}
 # Parameters that are ordinarily zero: that is no bound that cuts an answer off.
 _ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation that is reported where it is larger with 95 % probability [-].
@@ -32,6 +34,9 @@ _REPORTED_CORRELATION = 0.1
 # A correlation from which intervals are too narrow where readings determine a mean no
 # better than so many independent ones (tests/inference/test_correlation_prior.py).
 _STRONG_CORRELATION, _FEW_EFFECTIVE = 0.5, 26.0
+# The smallest share of its prior's upper end that is reported as the end itself: both
+# have the same two digits.
+_AT_BOUND = 0.99
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,10 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
 
 
 def correlation_check(
-    draws: Mapping[str, np.ndarray], rows: int, reason: str = ""
+    draws: Mapping[str, np.ndarray],
+    rows: int,
+    priors: Mapping[str, Prior],
+    reason: str = "",
 ) -> Check:
     """Report the correlation of neighbouring readings, or the reason for none."""
     if CORRELATION not in draws:
@@ -105,9 +113,11 @@ def correlation_check(
     )
     if least < _REPORTED_CORRELATION:
         return Check(INDEPENDENT, "passed", "the readings show no correlation")
-    words = (
-        "the errors of neighbouring readings have a correlation of "
-        f"{middle:.2f} ({low:.2f} to {high:.2f}, 95 %)"
+    words = f"the errors of neighbouring readings have a correlation of {middle:.2f}"
+    prior = priors[CORRELATION]
+    at_bound = prior.family == "uniform" and low > _AT_BOUND * float(prior.numbers[1])
+    words += (
+        ", the largest possible" if at_bound else f" ({low:.2f} to {high:.2f}, 95 %)"
     )
     # 1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|: the variance of a mean.
     effective = (rows - (rows - 2) * middle) / (1.0 + middle)
@@ -116,9 +126,12 @@ def correlation_check(
     words += (
         ". Every interval allows for it, but these readings are equivalent to some "
         f"{effective:.0f} independent ones: 95 % intervals can contain the truth in "
-        "85 % of cases only. Read longer or repeat"
+        "85 % of cases only. "
     )
-    return Check(INDEPENDENT, "warning", words)
+    slow = "Errors that last so long are rather a curve, a loop or a drift: diagnose"
+    return Check(
+        INDEPENDENT, "warning", words + (slow if at_bound else "Read longer or repeat")
+    )
 
 
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
@@ -161,8 +174,8 @@ def conflict_check(
     else:
         name = PLAUSIBLE
         remedy = "Check units, reading (radial or diametral) and sizes of the gear"
-    medians = listed([f"{parameter} = {words}" for parameter, words in far.items()])
-    words = f"far outside what was expected before the data: {medians}. {remedy}"
+    medians = listed([f"{_WORDS.get(n, n)} = {words}" for n, words in far.items()])
+    words = f"beyond the 99.7 % range of the prior: {medians}. {remedy}"
     return Check(name, "warning", words)
 
 

@@ -181,7 +181,7 @@ def excluded_findings(case: Case, deformation: float, sense: float) -> list[Find
         way = "increases" if sense > 0.0 else "decreases"
         words = "the calibration left out the readings where the "
         words += f"{case.units.displacement} {way}"
-        remedy = "Choose the other direction, or calibrate with the range all"
+        remedy = "Choose the other direction, or calibrate with `range` all"
         return [Finding("direction", words, remedy)]
     if not any(low < deformation < high for low, high in case.excluded):
         return []
@@ -190,7 +190,7 @@ def excluded_findings(case: Case, deformation: float, sense: float) -> list[Find
         f"{deformation:g} {unit} is outside the calibrated part of the curve, "
         f"{tested.min():.4g} to {tested.max():.4g} {unit}; readings there were left out"
     )
-    remedy = "Choose a deformation inside, or calibrate with the range all"
+    remedy = "Choose a deformation inside, or calibrate with `range` all"
     return [Finding("deformation", words, remedy)]
 
 

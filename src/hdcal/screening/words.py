@@ -84,8 +84,14 @@ def _sentence(found: Observation, labels: np.ndarray, units: Quantities) -> str:
 
 def _rows(found: Observation, labels: np.ndarray) -> str:
     each = [
-        f"{labels[first]}" if first == last else f"{labels[first]}-{labels[last]}"
+        f"{labels[first]}" if first == last else _span(*labels[[first, last]])
         for first, last in found.rows[:_LISTED]
     ]
     more = ", …" if len(found.rows) > _LISTED else ""
     return f"row{'s' if found.count > 1 else ''} {', '.join(each)}{more}"
+
+
+def _span(first: object, last: object) -> str:
+    """Return a span of rows; of rows of one file, as '9 of a', the file once."""
+    file = str(last).partition(" ")[2]
+    return f"{str(first).removesuffix(f' {file}')}-{last}"

@@ -135,7 +135,8 @@ def _whiten(posterior: Posterior, near: Linearisation, residual) -> Whitened:
 def noise_warnings(posterior: Posterior) -> tuple[str, ...]:
     """Return a warning for each fault of the noise, for answers that depend on it."""
     words = [fault.words for fault in residuals(posterior).noise]
-    correlation = correlation_check(posterior.draws, len(posterior.case.records.force))
+    draws, rows = posterior.draws, len(posterior.case.records.force)
+    correlation = correlation_check(draws, rows, posterior.priors)
     if correlation.outcome == "warning":
         words.append(f"{correlation.words[:1].upper()}{correlation.words[1:]}.")
     return tuple(words)
