@@ -8,7 +8,8 @@ import pytest
 from commands import Hdcal
 from schema_checks import obeys
 
-from hdcal.calibration.check.check import CaseCheck
+from hdcal.calibration.check.check import CaseCheck, check
+from hdcal.data.reading import read_case
 
 X = np.linspace(0.0, 0.5, 6)
 SLOPES = {"A": 100.0, "B": 120.0, "C": 90.0}
@@ -82,3 +83,18 @@ def test_each_certificate_is_shown_as_a_standard_uncertainty(tmp_path, here: Hdc
     names = {one["parameter"] for one in answer["certificates"]}
     assert names == {*sizes} - {"force_offset"}
     assert certificates(here, tmp_path, "")["certificates"] == []
+
+
+def test_the_picture_distinguishes_specimens_runs_or_movements():
+    x = np.concatenate([X, X[-2::-1]])
+    table = {"deformation_mm": x, "force_N": 100.0 * x + 0.1 * (np.arange(11) % 3)}
+    halves = np.repeat(["a", "b"], [6, 5])
+
+    def labels(table: dict) -> list[str]:
+        chart = check(read_case(table)).charts()["readings"]
+        return [mark.label for mark in chart.panels[0].marks]
+
+    assert labels(table) == ["loading", "unloading"]
+    assert labels(table | {"run": halves}) == ["run a", "run b"]
+    assert labels(table | {"specimen": halves}) == ["specimen a", "specimen b"]
+    assert labels({name: values[:6] for name, values in table.items()}) == [""]

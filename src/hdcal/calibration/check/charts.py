@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.loading import movement_words
 from hdcal.report.charts.axes import displacement_axis, load_axis
 from hdcal.report.charts.chart_spec import CYCLE, Chart, Panel, Points, drawn_rows
 from hdcal.screening.result import REPEATED, SEGMENT_WORDS, SEGMENTS, Screening
@@ -14,7 +15,7 @@ _DRAWN = [place for place in range(len(SEGMENTS)) if place != REPEATED]
 
 
 def readings_chart(case: Case) -> Chart:
-    """Return force over deformation; each specimen has a colour, or else each run."""
+    """Return force over deformation; specimens, runs or movements have colours."""
     marks = [*_members(case)]
     if case.screening is not None:
         marks += left_out(case.screening)
@@ -24,20 +25,22 @@ def readings_chart(case: Case) -> Chart:
 
 
 def _members(case: Case) -> Iterator[Points]:
-    """Yield the rows of each specimen, or of each run."""
+    """Yield the rows of each specimen, or of each run, of one run of each movement."""
     records = case.records
-    several = len(case.specimen_labels) > 1
-    names = case.specimen_labels if several else case.run_labels
-    index = np.asarray(records.specimen if several else records.run)
-    kind = "specimen " if several else "run "
+    read, kind = np.asarray(records.deformation), ""
+    movements = movement_words(read, case.units.displacement)
+    names = [*movements.values()]
+    index = (np.asarray(records.sense) != next(iter(movements))).astype(int)
+    for each, labels in (("run", case.run_labels), ("specimen", case.specimen_labels)):
+        if len(labels) > 1:
+            kind, index = f"{each} ", np.asarray(getattr(records, each))
+            names = labels
     drawn = drawn_rows(np.asarray(records.force))
-    x, y, group = (
-        np.asarray(values)[drawn]
-        for values in (records.deformation, records.force, index)
-    )
-    for place in np.unique(group):
+    x, y, group = (np.asarray(values)[drawn] for values in (read, records.force, index))
+    groups = np.unique(group)
+    for place in groups:
         yield Points(
-            label=f"{kind}{names[place]}" if len(names) > 1 else "",
+            label=f"{kind}{names[place]}" if len(groups) > 1 else "",
             x=x[group == place],
             y=y[group == place],
             colour=CYCLE[place % len(CYCLE)],
