@@ -9,6 +9,7 @@ from rigs import make_records
 
 from hdcal.data.case import Case
 from hdcal.diagnosis import decision
+from hdcal.diagnosis.acting import Acting
 from hdcal.diagnosis.decision import Decision
 from hdcal.diagnosis.which import Cause
 from hdcal.evidence.search import search
@@ -133,3 +134,18 @@ def test_effects_without_their_column_are_not_tested():
     assert which.not_testable["thermal_stiffness"] == ("temperature",)
     assert which.not_testable["ovality"] == ("angle",)
     assert not which.not_testable.keys() & which.inclusion.keys()
+
+
+def test_effects_that_carry_little_beside_something_outside_are_not_calibrated():
+    """In three of ten draws friction closes half of the gap."""
+    carried = np.array([0.1] * 7 + [0.9] * 3)
+    both = ("coulomb_friction", "outside")
+    found = Acting(0.2, both, "outliers", {}, carried, np.ones(10))
+    alone, whole = ("outliers", "outside"), ("coulomb_friction", "outliers", "outside")
+    assert found.hypotheses() == pytest.approx({alone: 0.7, whole: 0.3})
+    explained = {("outside",): 0.7, ("coulomb_friction", "outliers"): 0.3}
+    assert found.explanations() == pytest.approx(explained)
+    single = replace(found, components=("coulomb_friction",), noise="")
+    assert single.hypotheses() == {("coulomb_friction",): 1.0}
+    assert single.explanations() == single.hypotheses()
+    assert replace(found, components=()).explanations() == {("outliers",): 1.0}

@@ -52,6 +52,10 @@ def test_the_odd_gear_is_named_first_and_in_the_table():
     quiet = handmade(odd={})
     assert quiet.headline.endswith("none is flagged.") and not quiet.flagged
     assert quiet.false_discovery_rate is None and quiet.next_step is None
+    table = quiet.gear_table.assign(probability_off=[0.1, 0.6, 0.2, 0.1])
+    unsure = quiet.model_copy(update={"gear_table": table})
+    assert "B most probably deviates (60 %)" in unsure.headline
+    assert unsure.next_step and "B again" in unsure.next_step
 
 
 def test_several_quantities_are_said_of_one_gear():

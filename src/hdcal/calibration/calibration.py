@@ -4,9 +4,12 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Literal, get_args
 
+import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.calibration.charts import calibration_chart, residual_chart
+from hdcal.data.case import from_contact
+from hdcal.data.loading import movement_words
 from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
@@ -71,6 +74,15 @@ class Calibration(PosteriorResult):
         if screening is None or part is None or part.whole or self.acting:
             return ""
         return screening.working_range
+
+    @property
+    def left_branch(self) -> str:
+        """The movement whose readings were left out, in a word; empty for none."""
+        case = self.posterior.case
+        if case.excluded_sense == 0:
+            return ""
+        read = np.asarray(from_contact(case).records.deformation)
+        return movement_words(read, self.units.displacement)[case.excluded_sense]
 
     @property
     def known(self) -> frozenset[str]:
@@ -184,6 +196,8 @@ def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
         yield WILD
     if "specimens" in known:
         yield "several specimens"
+    if posterior.case.excluded_sense:
+        yield "one branch"
     if INDEPENDENT in warned and "unloading" in known:
         yield "strong correlation"
     if posterior.settings["with_gap"]:
@@ -192,4 +206,5 @@ def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
     yield from (shape.name for shape in left.noise if shape.name != WILD)
     if NOISY in warned and not left.structure:
         yield "much noise"
-    yield from (f"no {name}" for name in _WANTED if name not in known)
+    wanted = _WANTED[1:] if posterior.case.excluded_sense else _WANTED
+    yield from (f"no {name}" for name in wanted if name not in known)

@@ -110,9 +110,8 @@ def _readings(
 ) -> Iterator[Points]:
     """Yield some rows as points, each direction with its marker."""
     x, y, sense = map(np.asarray, (x, y, left.records.sense))
-    words = movement_words(
-        np.asarray(left.records.deformation), left.units.displacement
-    )
+    read = np.asarray(left.records.deformation)
+    words = movement_words(read - left.contact, left.units.displacement)
     for sign, (marker, usual) in _MARKERS.items():
         rows = here & (sense == sign)
         if rows.any():

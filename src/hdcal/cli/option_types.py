@@ -90,7 +90,9 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     except UnitError as error:
         raise _refused(option, str(error), remedy) from None
     if code != unit:
-        problem = f"'{text}' is not {kind}: its unit is that of {code}"
+        problem = f"'{text}' is not {kind}"
+        if unit == "mm" and code == "1":
+            remedy += "; write an angle in rad, without unit"
         raise _refused(option, problem, remedy)
     return InUnit(number * factor)
 

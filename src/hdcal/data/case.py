@@ -1,7 +1,7 @@
 """A case: a gear, how it was read, and the records."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -55,6 +55,14 @@ class Gear:
     density: float | None = None
     gauge_priors: dict[str, Prior] = field(default_factory=dict)
     full_scale: FullScale = REFERENCE
+
+    @property
+    def contact(self) -> float:
+        """Deformation as read at which the unloaded part is expected [mm]."""
+        prior = self.priors["deformation_offset"]
+        known = prior.family in ("normal", "fixed", "uniform")
+        ends = prior.numbers if prior.family == "uniform" else prior.numbers[:1]
+        return float(sum(ends)) / len(ends) if known else 0.0
 
     @property
     def reach(self) -> float:
@@ -133,6 +141,22 @@ class Case:
     def _check(self) -> Any:
         # Imported by its name: data are below the questions that are asked of them.
         return import_module("hdcal.calibration.check.check").check(self)
+
+
+def from_contact(case: Case) -> Case:
+    """Return a case whose deformations are counted from the unloaded part."""
+    gear, records, zero = case.gear, case.records, case.gear.contact
+    if zero == 0.0:
+        return case
+    prior = gear.priors["deformation_offset"]
+    places = 2 if prior.family == "uniform" else 1
+    moved = (*(n - zero for n in prior.numbers[:places]), *prior.numbers[places:])
+    priors = gear.priors | {"deformation_offset": replace(prior, numbers=moved)}
+    return replace(
+        case,
+        gear=replace(gear, priors=priors),
+        records=replace(records, deformation=records.deformation - zero),
+    )
 
 
 def require_force(case: Case, question: str) -> None:

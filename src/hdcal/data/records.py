@@ -82,9 +82,13 @@ FEATURE_WORDS = {"holds or rates": "holds or several rates"}
 _FAR = 1.0
 
 
-def lies_far(records: Records) -> bool:
+# Source of the prior of their zero.
+OF_POSITIONS = "readings of a position: where their straight line has no force"
+
+
+def lies_far(deformation: Array) -> bool:
     """Return whether deformations lie far from their origin for their range."""
-    low, high = float(np.min(records.deformation)), float(np.max(records.deformation))
+    low, high = float(np.min(deformation)), float(np.max(deformation))
     return abs(low + high) / 2.0 > _FAR * (high - low)
 
 

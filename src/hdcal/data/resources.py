@@ -25,6 +25,8 @@ def pages() -> dict[str, Traversable]:
     for folder in _PAGE_FOLDERS:
         for page in sorted((root / folder).iterdir(), key=lambda page: page.name):
             name, dot, kind = page.name.rpartition(".")
+            # The list of effects is called by its folder.
+            name = "effects" if (folder, name) == (_PAGE_FOLDERS[-1], "index") else name
             if dot and kind == "md" and name not in ("index", *_FOR_THE_WEB):
                 found[name] = page
     return found

@@ -96,19 +96,31 @@ class Acting:
     carried: Float[np.ndarray, " d"]
     rms: Float[np.ndarray, " d"]
 
+    def hypotheses(self) -> dict[Names, float]:
+        """Return hypotheses that stand for the draws, and their shares of them.
+
+        Effects that close less than half of the gap beside something outside are left
+        out: they are next to undetermined.
+        """
+        noise = [self.noise] if self.noise else []
+        whole = tuple(sorted([*self.components, *noise]))
+        if OUTSIDE not in self.components or len(self.components) == 1:
+            return {whole: 1.0}
+        alone = float(np.mean(self.carried < CARRIED))
+        return {tuple(sorted([OUTSIDE, *noise])): alone, whole: 1.0 - alone}
+
     def explanations(self) -> dict[Names, float]:
         """Return explanations of the draws and their shares of them.
 
         An explanation is the set of effects that act, or `OUTSIDE` where these close
         less than half of the gap; () means that nothing acts.
         """
-        effects = [name for name in self.components if name != OUTSIDE]
-        noise = [self.noise] if self.noise else []
-        names = tuple(sorted([*effects, *noise]))
-        if OUTSIDE not in self.components:
-            return {names: 1.0}
-        outside = float(np.mean(self.carried < CARRIED)) if effects else 1.0
-        return {(OUTSIDE,): outside, names: 1.0 - outside}
+        found: dict[Names, float] = {}
+        for names, share in self.hypotheses().items():
+            effects = tuple(name for name in names if name != OUTSIDE)
+            alone = OUTSIDE in names and {*effects} <= {self.noise}
+            found[(OUTSIDE,) if alone else effects] = share
+        return found
 
 
 def acting(

@@ -44,6 +44,8 @@ def gap_chart(case: Case, rows: GapByRow) -> Chart:
     records, points, bands, lines = rows.records, list[Mark](), list[Mark](), []
     x, sense = np.asarray(records.deformation), np.asarray(records.sense)
     words = movement_words(x, case.units.displacement)
+    # As read again, not from contact.
+    x = x + case.gear.contact
     drawn = drawn_rows(rows.residual)
     turns = np.flatnonzero(np.diff(half_cycles(records))) + 1
     halves = np.split(np.arange(len(x)), turns)

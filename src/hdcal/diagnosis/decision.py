@@ -1,7 +1,7 @@
 """The decision: which effects act, and which share of the gap they close."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,9 +35,9 @@ class Decision:
     """What a case shows about what its base model lacks.
 
     `gap` is the probability that something acts, `gap_N` the rms of what acts on the
-    mean reading where it does, None where no draws were made. `hypotheses` are
-    components on the mean reading with an effect on the noise; `explanations` are all,
-    likeliest first.
+    mean reading where it does, None where no draws were made. `hypotheses` are the
+    components that act, on mean and noise, with their probabilities; `explanations` are
+    all, likeliest first.
     """
 
     gap: float
@@ -62,7 +62,14 @@ def decide(
     found = acting(searched, chance, class_of, rng)
     on_noise = [name for name in ON_NOISE if name in searched.effects]
     groups += [(name,) for name in on_noise]
-    explanations = _explanations(found)
+    explanations = tuple(
+        Explanation(
+            effects=tuple(name for name in names if name != OUTSIDE),
+            outside=OUTSIDE in names,
+            probability=min(chance, 1.0),
+        )
+        for names, chance in _summed(found, Acting.explanations)
+    )
     gap = 1.0 - sum(each.probability for each in explanations if each.nothing)
     causes = [_cause(members, found, gap) for members in groups]
     causes.sort(key=lambda each: -each.probability)
@@ -88,7 +95,7 @@ def decide(
         gap_N=_interval([(each.rms, each.weight) for each in found if each.components]),
         which=which,
         explanations=explanations,
-        hypotheses=_hypotheses(searched, chance),
+        hypotheses=dict(_summed(found, Acting.hypotheses)),
         coarse_step=searched.coarse_step,
     )
 
@@ -137,32 +144,15 @@ def _interval(samples: Sequence[tuple[np.ndarray, float]]) -> Interval | None:
     return Interval(median=float(median), lo=float(low), hi=float(high))
 
 
-def _explanations(found: Sequence[Acting]) -> tuple[Explanation, ...]:
-    """Return explanations, the most probable first."""
+def _summed(
+    found: Sequence[Acting], names_of: Callable[[Acting], Mapping[Names, float]]
+) -> list[tuple[Names, float]]:
+    """Return sets of names with their probabilities, the most probable first."""
     chance: dict[Names, float] = defaultdict(float)
     for each in found:
-        for names, share in each.explanations().items():
+        for names, share in names_of(each).items():
             chance[names] += each.weight * share
-    return tuple(
-        Explanation(
-            effects=tuple(name for name in names if name != OUTSIDE),
-            outside=OUTSIDE in names,
-            probability=min(chance[names], 1.0),
-        )
-        for names in sorted(chance, key=lambda names: (-chance[names], names))
-    )
-
-
-def _hypotheses(
-    searched: Searched, chance: Mapping[Names, np.ndarray]
-) -> dict[Names, float]:
-    """Return the probability of components on the mean with effects on the noise."""
-    found: dict[Names, float] = defaultdict(float)
-    for key, row in chance.items():
-        for noise, each in zip(searched.table.noises, row, strict=True):
-            names = (*key, noise.name) if noise.name else key
-            found[tuple(sorted(names))] += float(each)
-    return dict(found)
+    return sorted(chance.items(), key=lambda item: (-item[1], item[0]))
 
 
 def adequacy_p_value(searched: Searched, key: Names, rng: np.random.Generator) -> float:

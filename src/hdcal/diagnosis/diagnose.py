@@ -7,7 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from hdcal.calibration.known_effects import check_effect_priors
-from hdcal.data.case import Case, require_case
+from hdcal.data.case import Case, from_contact, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
@@ -62,6 +62,7 @@ def diagnose(
     effects = library_of(library)
     _check(case, effects, seed)
     rng = np.random.default_rng(seed)
+    read, case = case, from_contact(case)
     searched = search(case, effects)
     found = decide(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
@@ -71,9 +72,9 @@ def diagnose(
         f"{effect_words(name)} is excluded: the gear file fixes its amplitude at zero"
         for name in searched.excluded
     ]
-    calibrated, fits = case, Refits({}, None, ())
+    calibrated, fits = read, Refits({}, None, ())
     if not quick:
-        calibrated = rows_to_calibrate(case)
+        calibrated = rows_to_calibrate(read)
         fits = refit(calibrated, found.hypotheses, effects, seed, progress)
     return Diagnosis(
         part="part" if case.gear.theory == SPRING else "gear",
@@ -95,7 +96,7 @@ def diagnose(
         seed=seed,
         versions=versions(),
         data=_data(case, searched, (*calibrated.notes, *excluded, *fits.failures)),
-        case=case,
+        case=read,
         rows=gap_by_row(searched, posterior, rng),
         posteriors=dict(fits.posteriors),
     )

@@ -13,7 +13,7 @@ from hdcal.cli.option_types import FORCE, LENGTH, unit_findings
 @click.option(
     "--deformation",
     type=LENGTH,
-    help="Predict the force of future gears at this deformation as read [mm].",
+    help="Predict the force of future gears at this deformation [mm] or angle [rad].",
 )
 @click.option(
     "--limit-force", type=FORCE, help="Compare that force with this capacity [N]."

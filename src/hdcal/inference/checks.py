@@ -25,6 +25,8 @@ MIN_BFMI = 0.3
 COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
+# Size and length of the discrepancy say nothing of units and sizes.
+_DISCREPANCY = {"gap_sd", "gap_length"}
 # Parameters in sentences, where their name is not that of the field.
 _WORDS = {"sigma": "noise sd", CORRELATION: "correlation of neighbouring readings"}
 # Parameters that are ordinarily zero: that is no bound that cuts an answer off.
@@ -150,8 +152,8 @@ def conflict_check(
 ) -> Check:
     """Warn of posteriors that lie far out in the tails of their priors."""
     far, above = {}, {}
-    for parameter, values in draws.items():
-        stated = priors[parameter]
+    for parameter in (name for name in draws if name not in _DISCREPANCY):
+        stated, values = priors[parameter], draws[parameter]
         prior, median = frozen(stated, parameter), float(np.median(values))
         # A density that is highest at zero, as of an effect, expects a zero.
         peaks_at_zero = stated.family == "half_normal" or (

@@ -69,6 +69,8 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
     if format_name != kind.format:
         problem = f"is {written.words} ({format_name}), and {kind.format} is needed"
         remedy = f"Name the result folder {kind.words}, or {kind.again}"
+        if written == FLEET:
+            remedy += "; hdcal fleet --deformation gives the force of a future part"
     elif tree.attrs.get(DIGEST) != digest(tree):
         problem = "was changed after hdcal wrote it"
         remedy = f"Take the file as it was written, or {kind.again}"

@@ -140,7 +140,7 @@ class PosteriorResult(Result):
                 prior.source or "the gear file",
             )
             for name, prior in self.posterior.priors.items()
-            if name in self.posterior.draws
+            if name in self.measured
         ]
 
 

@@ -15,13 +15,14 @@ from hdcal.data.measurements.notes import (
     ASSUMED,
     gear_notes,
     mountings_note,
+    positions_note,
     resets_note,
     rigs_note,
 )
 from hdcal.data.measurements.screened import asked_range, screened, screening_notes
-from hdcal.data.prior import scale_of
+from hdcal.data.prior import Prior, scale_of
 from hdcal.data.priors import rig_priors
-from hdcal.data.records import Records
+from hdcal.data.records import OF_POSITIONS, Records, lies_far
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import TORQUE
@@ -64,6 +65,7 @@ def screened_case(
     motion = derive_motion(x, run, measured.get("time"), hidden=hidden)
     sense = sense_at_turns(motion.sense, x, measured["force"], run)
     motion = replace(motion, sense=sense)
+    gear = _at_own_scale(gear, measured, run)
     further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
     mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
     every = [
@@ -72,10 +74,10 @@ def screened_case(
         *resets_note(motion, measured.rows, measured.units),
         *mountings_note(measured.stated, mounted, len(gears)),
         *rigs_note(measured.get("rig", ()), len(gears)),
+        *positions_note(gear, x, measured.units),
         *([] if screening is None else screening_notes(screening, measured.units)),
         *of_labels,
     ]
-    gear = _at_own_scale(gear, measured, run)
     cut = screening if len(gears) == 1 else None
     return Case(
         name=name,
@@ -103,11 +105,29 @@ def _at_own_scale(gear: Gear, measured: Measurements, run: np.ndarray) -> Gear:
         prior = correlation_prior(cutoff, x, run, measured.get("time"))
         scales = scales | {_CORRELATION: prior}
     scale = scale_of(measured["force"], x, gear.reading)
+    zero = priors["deformation_offset"]
     if measured.units == TORQUE:
         # The shipped prior is that of a contact, in mm.
-        zero = scale.own(priors["deformation_offset"])
-        priors = priors | {"deformation_offset": zero}
+        priors = priors | {"deformation_offset": scale.own(zero)}
+    if zero.source == rig_priors()["deformation_offset"].source and lies_far(x):
+        unloaded = _without_load(x, measured["force"])
+        numbers = (unloaded, scale.own(zero).numbers[1])
+        of_positions = Prior("normal", numbers, zero.unit, OF_POSITIONS)
+        priors = priors | {"deformation_offset": of_positions}
     return at_full_scale(replace(gear, priors=priors, scale_priors=scales), scale)
+
+
+def _without_load(deformation: np.ndarray, force: np.ndarray) -> float:
+    """Return where the straight line through readings has no force, as x is rounded.
+
+    Readings that do not rise have no such place: the origin is kept.
+    """
+    x, y = (values - np.mean(values) for values in (deformation, force))
+    if (slope := float(x @ y) / float(x @ x)) <= 0.0:
+        return 0.0
+    step = 10.0 ** np.floor(np.log10(np.ptp(deformation)) - 3)
+    place = np.mean(deformation) - np.mean(force) / slope
+    return float(np.round(place / step) * step)
 
 
 def _require_torsion(gear: Gear, name: str) -> None:

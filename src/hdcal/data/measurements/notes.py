@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.loading import Motion
 from hdcal.data.measurements.labels import TELLING
+from hdcal.data.records import OF_POSITIONS
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.columns import Column
@@ -88,6 +89,21 @@ def gear_notes(
         yield (
             f"a median temperature of {np.median(temperature):.4g} °C is not "
             "plausible. Check the unit of the column"
+        )
+
+
+def positions_note(
+    gear: Gear, deformation: np.ndarray, units: Quantities
+) -> Iterator[str]:
+    """Yield where a part is unloaded whose deformation is read as a position, (n,)."""
+    if gear.priors["deformation_offset"].source == OF_POSITIONS:
+        low, high = float(np.min(deformation)), float(np.max(deformation))
+        unit = units.displacement_unit
+        yield (
+            f"{ASSUMED}the {units.displacement} is a position, {low:.6g} to {high:.6g} "
+            f"{unit}. The part is unloaded at {gear.contact:.6g} {unit}, where a "
+            f"straight line through the readings has no {units.load}. If not, state "
+            "the prior of deformation_offset in a gear file"
         )
 
 

@@ -38,7 +38,9 @@ def sheet_grid(
     if len(likely) > 1:
         tables = ", ".join(map(quoted, likely))
         words = f"{len(likely)} sheets contain a table: {tables}"
-        findings.refuse(words, "Select one with `sheet`")
+        remedy = "Select one with `sheet`. To compare parts write all rows into one "
+        remedy += "sheet with a column specimen, or each sheet into a file of a folder"
+        findings.refuse(words, remedy)
     note = f"sheet {quoted(likely[0])} is read. Select another one with `sheet`"
     return sheets[likely[0]], [note] if len(sheets) > 1 else [], ""
 

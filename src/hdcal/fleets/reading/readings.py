@@ -7,7 +7,7 @@ from typing import Self
 import jax
 import numpy as np
 
-from hdcal.data.case import Case, Gear
+from hdcal.data.case import Case, Gear, from_contact
 from hdcal.data.loading import loading_side
 from hdcal.data.measurements.bad_gears import among
 from hdcal.errors import Finding
@@ -221,7 +221,8 @@ _OF_RUNS = "run_labels", "operators", "rigs", "dates"
 
 
 def fleet_readings(case: Case) -> FleetReadings:
-    """Return the readings of a case."""
+    """Return the readings of a case, from contact on."""
+    case = from_contact(case)
     records = case.records
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
     (gear, run), index = np.unique(labels, axis=1, return_inverse=True)

@@ -115,7 +115,7 @@ def _sample_contact(problem: "Problem", values: Mapping):
     Rows of a gear that is pressed determine ω₀ + c well, and neither ω₀ nor c. Rows of
     a gear that is both pressed and pulled determine ω₀ itself.
     """
-    way = jnp.sign(problem.rows.deformation)
+    way = jnp.sign(problem.rows.deformation - problem.contact)
     pressed = jnp.mean(way, where=measured(len(way), problem.count))
     taken_up = pressed * values[SLACK] / problem.reading.radial_per_read
     return sample_affine(CONTACT, problem.priors[CONTACT], "_corner", shift=taken_up)

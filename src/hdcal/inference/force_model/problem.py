@@ -61,7 +61,9 @@ class Problem(Sampled):
     discrepancy: Discrepancy | None
     # Of rounding [N], 0 for none.
     step: Float[Array, ""] | float
-    # Middle of the deformations as read [mm].
+    # Deformation as read at which the unloaded part is expected [mm], and middle of the
+    # readings from there.
+    contact: Float[Array, ""] | float
     centre: Float[Array, ""] | float
     # Mean of the readings [N].
     level: Float[Array, ""] | float
@@ -184,9 +186,14 @@ def build_problem(
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=tuple(integrated),
-        centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
+        contact=case.gear.contact,
+        centre=_middle(records.deformation) - case.gear.contact,
         level=float(np.mean(records.force)),
     )
+
+
+def _middle(values: Array) -> float:
+    return (float(np.min(values)) + float(np.max(values))) / 2.0
 
 
 def _kept_rows(

@@ -60,6 +60,7 @@ class Residuals:
     structure: tuple[ResidualFinding, ...]
     noise: tuple[ResidualFinding, ...]
     units: Quantities
+    contact: float  # deformation as read of the unloaded part [mm]
 
 
 def residuals(posterior: Posterior) -> Residuals:
@@ -95,6 +96,7 @@ def residuals(posterior: Posterior) -> Residuals:
         structure=tuple(replace(s, words=units.say(s.words)) for s in structure),
         noise=tuple(replace(s, words=units.say(s.words)) for s in faults),
         units=units,
+        contact=posterior.case.gear.contact,
     )
 
 

@@ -66,6 +66,7 @@ def branches(bands: "Bands") -> list[Branch]:
     # The tested side; the curves may go beyond zero to a nominal deformation.
     tested = np.asarray(bands.tested, bool)
     places = bands.deformation_mm[tested if tested.any() else slice(None)]
+    places = places - bands.contact
     side, name = loading_side(places), bands.units.displacement
     words, opacity = movement_words(places, name), 1.0 / np.sqrt(len(levels))
     every: list[Branch] = []

@@ -20,7 +20,7 @@ _COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
     "--deformation",
     type=DEFORMATIONS,
     required=True,
-    help="Predict at these deformations as read [mm]: 0:0.6:61 or 0.1,0.2.",
+    help="Predict at these deformations [mm] or angles [rad]: 0:0.6:61 or 0.1,0.2.",
 )
 @click.option(
     "--temperature",

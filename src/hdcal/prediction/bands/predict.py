@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.case import Case, from_contact
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Records, lies_far
 from hdcal.data.theory_names import SPRING
@@ -88,7 +88,7 @@ def predict(
             words = f"'{direction}' is not a direction"
             wrong.append(Finding("direction", words, "Use up or down"))
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
-    loading = _loading(at, case.records)
+    loading = _loading(at, case)
     sense = loading if direction is None else np.full(len(at), SENSE[direction])
     tails = [0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0]
     blocks = []
@@ -117,6 +117,7 @@ def predict(
         weight_left_out=left_out_of(models),
         averaging=tuple(averaging_words(models)),
         tested_range=_range_words(case),
+        contact=case.gear.contact,
         beyond_tested=max(beyond_tested(float(x), case.records) for x in along),
         part="part" if case.gear.theory == SPRING else "gear",
         units=case.units,
@@ -163,10 +164,11 @@ def _numbers(name: str, given: Any) -> np.ndarray:
     return numbers
 
 
-def _loading(at: np.ndarray, records: Records) -> np.ndarray:
+def _loading(at: np.ndarray, case: Case) -> np.ndarray:
     """Return the direction of loading of each row, +1 where the deformation rises."""
+    at, read = at - case.gear.contact, from_contact(case).records.deformation
     # A gear at rest is loaded as the tested one was.
-    tested = np.min(records.deformation) + np.max(records.deformation)
+    tested = np.min(read) + np.max(read)
     return np.where(np.where(at == 0.0, tested, at) < 0.0, -1.0, 1.0)
 
 
@@ -179,7 +181,7 @@ def _deformation_findings(
         return wrong
     worst = float(deformation[np.argmax(np.abs(deformation))])
     wrong = far_findings(worst, tested, case.gear.reach, case.units.displacement_unit)
-    sense = SENSE.get(direction or "", _loading(deformation, case.records))
+    sense = SENSE.get(direction or "", _loading(deformation, case))
     each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
     return wrong + next(filter(None, each), [])
 
@@ -221,7 +223,7 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
 def _default_grid(case: Case) -> np.ndarray:
     records, nominal = case.records, case.gear.nominal_deformation
     ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
-    ends += [] if lies_far(records) else [0.0]
+    ends += [] if lies_far(records.deformation) else [0.0]
     ends += [] if nominal is None else [nominal]
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)

@@ -48,6 +48,7 @@ class Bands(Result):
     averaging: tuple[str, ...] = Field(exclude=True)
     tested_range: str = Field(exclude=True)
     beyond_tested: float = Field(exclude=True)
+    contact: float = Field(exclude=True)
 
     @computed_field(
         alias="columns", json_schema_extra={"additionalProperties": {"type": "array"}}

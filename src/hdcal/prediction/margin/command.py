@@ -20,7 +20,7 @@ from hdcal.errors import Finding
     "--deformation",
     type=LENGTH,
     required=True,
-    help="Bound the force at this deformation, as read [mm].",
+    help="Bound the force at this deformation, as read [mm], or angle [rad].",
 )
 @click.option(
     "--limit-force",

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hdcal.data.plausible import implausible
 from hdcal.data.priors import rig_priors
-from hdcal.data.records import lies_far
+from hdcal.data.records import OF_POSITIONS, lies_far
 from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.conditions import (
@@ -175,7 +175,8 @@ def _force(
 ) -> Iterator[Finding]:
     units = model.posterior.case.units
     unit, place = units.load_unit, f"{at:g} {units.displacement_unit}"
-    usual = abs(float(np.median(model.draws["stiffness"])) * at)
+    path = at - np.median(model.draws["deformation_offset"])
+    usual = abs(float(np.median(model.draws["stiffness"]) * path))
     if force is None:
         return
     if wrong := implausible(name, force):
@@ -197,8 +198,9 @@ def _force(
 
 def _knows_contact(posterior: Posterior) -> bool:
     """Return whether the origin may be first contact, or the gear file states that."""
-    stated = is_stated(posterior, "deformation_offset")
-    return stated or not lies_far(posterior.case.records)
+    prior = posterior.priors["deformation_offset"]
+    stated = is_stated(posterior, "deformation_offset") and prior.source != OF_POSITIONS
+    return stated or not lies_far(posterior.case.records.deformation)
 
 
 def is_stated(posterior: Posterior, zero: str) -> bool:
