@@ -95,6 +95,27 @@ def test_effects_without_readings_for_a_calibration_are_carried_by_another(monke
     assert found.left_out.counted_as == "coulomb_friction+unknown"
 
 
+def test_a_discrepancy_stands_for_curves_of_the_deformation(monkeypatch):
+    case, names = make_case(cycles(48)), []
+
+    def calibrated(_, *, effects, with_gap, **__):
+        names.append((effects, with_gap))
+        draws = {"stiffness": np.array([199.0, 201.0])}
+        return SimpleNamespace(usable=True, draws=draws, reasons=())
+
+    monkeypatch.setattr("hdcal.calibration.calibrate.calibrate", calibrated)
+    friction, onset = "coulomb_friction", "contact_onset"
+    both = (onset, friction, "outside")
+    chances = {(onset,): 0.6, (onset, "outside"): 0.25, both: 0.15}
+    found = refit(case, chances, EFFECTS, 0, None)
+    expected = [((onset,), False), ((), True), ((friction,), True)]
+    assert sorted(names) == sorted(expected)
+    shares = {name: share for name, (share, _) in found.posteriors.items()}
+    assert shares == pytest.approx(
+        {onset: 0.6, "unknown": 0.25, f"{friction}+unknown": 0.15}
+    )
+
+
 def test_nothing_is_left_where_all_calibrations_fail():
     found, _ = fits({"a": 0.3, "b": 0.7}, ("a", "b", "b+unknown", "unknown"))
     assert not found.posteriors and found.left_out is None

@@ -5,7 +5,8 @@ Those of 5 % and more are calibrated, whatever the verdict. If the others have m
 wherever the data let it; else the model that knows the stiffness least.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -62,17 +63,21 @@ def refit(
 
     An effect can be probable without the readings that its calibration needs, as one of
     the speed where a loop was read at one speed. Another model carries its probability.
+    A discrepancy stands for effects beside it that depend on the deformation alone:
+    both could describe the same curve, and a sampler would hardly move.
     Progress is that of one calibration after the other.
     """
     # Importing what samples takes longer than all the rest of a quick diagnosis.
     from hdcal.calibration.calibrate import calibrate
 
     lacking = {n for n, each in library.items() if each.needs - case.records.known}
-    probabilities = {
-        _name(key): chance
-        for key, chance in hypotheses.items()
-        if lacking.isdisjoint(key)
-    }
+    # Effects that are curves of the deformation alone, as a discrepancy is.
+    curves = {n for n, e in library.items() if not e.needs and e.stage != "noise"}
+    probabilities: dict[str, float] = defaultdict(float)
+    for key, chance in hypotheses.items():
+        if lacking.isdisjoint(key):
+            kept = {*key} - curves if OUTSIDE in key else key
+            probabilities[_name(kept)] += chance
 
     def calibrated(name: str) -> Posterior:
         parts = _parts(name)
@@ -86,20 +91,26 @@ def refit(
             progress=progress,
         )
 
-    return weighed(probabilities, calibrated)
+    return weighed(probabilities, calibrated, curves)
 
 
 def weighed(
-    probabilities: Mapping[str, float], calibrated: Callable[[str], Posterior]
+    probabilities: Mapping[str, float],
+    calibrated: Callable[[str], Posterior],
+    curves: Set[str] = frozenset(),
 ) -> Refits:
-    """Return the hypotheses that are kept; probabilities of all sum to 1."""
+    """Return the hypotheses that are kept; probabilities of all sum to 1.
+
+    A discrepancy stands for the effects among `curves`.
+    """
     fits = {name: calibrated(name) for name in _probable(probabilities)}
     usable = {name: fit for name, fit in fits.items() if fit.usable}
     missing = max(1.0 - sum(probabilities[name] for name in usable), 0.0)
     carrier = ""
     if missing > _MOST_LEFT_OUT:
         likeliest = max(probabilities, key=probabilities.__getitem__)
-        for name in dict.fromkeys((_name({*_parts(likeliest), OUTSIDE}), UNKNOWN)):
+        beside = _name({*_parts(likeliest), OUTSIDE} - curves)
+        for name in dict.fromkeys((beside, UNKNOWN)):
             fits[name] = fit = fits.get(name) or calibrated(name)
             if fit.usable:
                 usable[name], carrier = fit, name
