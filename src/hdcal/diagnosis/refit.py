@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # without a model with a discrepancy.
 _LEAST_SHARE, _MOST_LEFT_OUT = 0.05, 0.02
-# Rows from which on a model takes minutes and more to calibrate.
-_MOST_ROWS = 5_000
+# Rows from which on a model with a loop and a discrepancy takes minutes to calibrate.
+_MOST_ROWS = 2_000
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Refits:
 
 
 def rows_to_calibrate(case: Case) -> Case:
-    """Return the case with at most about 5,000 single rows, the turns among them."""
+    """Return the case with at most about 2,000 single rows, the turns among them."""
     rows = len(case.records.force)
     if rows <= _MOST_ROWS:
         return case
