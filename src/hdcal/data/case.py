@@ -9,7 +9,7 @@ import numpy as np
 
 from hdcal.data.prior import REFERENCE, FullScale, Prior
 from hdcal.data.records import Geometry, Records
-from hdcal.data.theory_names import Theory
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.quantities import FORCE, Quantities
 from hdcal.screening.result import Screening
@@ -55,6 +55,12 @@ class Gear:
     density: float | None = None
     gauge_priors: dict[str, Prior] = field(default_factory=dict)
     full_scale: FullScale = REFERENCE
+
+    @property
+    def read_as(self) -> str:
+        """Kind of the deformation in a word; empty of a spring, which has no radius."""
+        is_plain = self.theory == SPRING and self.reading == "radial"
+        return "" if is_plain else self.reading
 
     @property
     def contact(self) -> float:

@@ -44,7 +44,7 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
     if "temperature" not in records.known:
         warmth += ", not measured: the reference temperature"
     along = ends(records.deformation, units.displacement_unit)
-    reading = f", {gear.reading}" if units.is_force else ""
+    reading = f", {gear.read_as}" if gear.read_as and units.is_force else ""
     rows = [
         ("rows", str(len(records.force))),
         (units.displacement, f"{along}{reading}, as read"),

@@ -8,7 +8,8 @@ def displacement_axis(case: Case) -> str:
     """Return the axis of the deformation as read, radial or diametral."""
     units = case.units
     word, unit = units.displacement, units.displacement_unit
-    reading = f" ({case.gear.reading})" if units.is_force else ""
+    kind = case.gear.read_as if units.is_force else ""
+    reading = f" ({kind})" if kind else ""
     return f"{word} as read{reading} [{unit}]"
 
 
