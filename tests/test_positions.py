@@ -39,6 +39,9 @@ def test_a_deformation_or_a_zero_that_is_stated_stays():
     stated = position(-212.4, theory="spring", priors={"deformation_offset": zero})
     assert stated.gear.contact == -212.0
     assert not any("is a position" in note for note in stated.notes)
+    # A test that begins under load, at a deformation that is counted from contact.
+    loaded = {"deformation_mm": 30.0 + 0.5 * X, "force_N": 4.2 * (30.0 + 0.5 * X)}
+    assert hdcal.read_case(loaded).gear.contact == 0.0
     # A force that falls with the position shows no place without force.
     falling = {"deformation_mm": X + 950.0, "force_N": np.ones(120) + NOISE - 1e-3 * X}
     assert hdcal.read_case(falling, range="all").gear.contact == 0.0

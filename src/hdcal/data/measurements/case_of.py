@@ -109,25 +109,29 @@ def _at_own_scale(gear: Gear, measured: Measurements, run: np.ndarray) -> Gear:
     if measured.units == TORQUE:
         # The shipped prior is that of a contact, in mm.
         priors = priors | {"deformation_offset": scale.own(zero)}
-    if zero.source == rig_priors()["deformation_offset"].source and lies_far(x):
-        unloaded = _without_load(x, measured["force"])
-        numbers = (unloaded, scale.own(zero).numbers[1])
-        of_positions = Prior("normal", numbers, zero.unit, OF_POSITIONS)
-        priors = priors | {"deformation_offset": of_positions}
+    if zero.source == rig_priors()["deformation_offset"].source:
+        unloaded = _position_without_load(x, measured["force"])
+        if unloaded is not None:
+            numbers = (unloaded, scale.own(zero).numbers[1])
+            of_positions = Prior("normal", numbers, zero.unit, OF_POSITIONS)
+            priors = priors | {"deformation_offset": of_positions}
     return at_full_scale(replace(gear, priors=priors, scale_priors=scales), scale)
 
 
-def _without_load(deformation: np.ndarray, force: np.ndarray) -> float:
-    """Return where the straight line through readings has no force, as x is rounded.
+def _position_without_load(deformation: np.ndarray, force: np.ndarray) -> float | None:
+    """Return where a straight line through readings of a position has no force.
 
-    Readings that do not rise have no such place: the origin is kept.
+    None where they are deformations: they, or that place, are near the origin.
     """
+    if not deformation.size or not lies_far(deformation):
+        return None
     x, y = (values - np.mean(values) for values in (deformation, force))
-    if (slope := float(x @ y) / float(x @ x)) <= 0.0:
-        return 0.0
-    step = 10.0 ** np.floor(np.log10(np.ptp(deformation)) - 3)
-    place = np.mean(deformation) - np.mean(force) / slope
-    return float(np.round(place / step) * step)
+    width, pull = float(np.ptp(deformation)), float(x @ y)
+    if pull <= 0.0:
+        return None
+    place = float(np.mean(deformation) - np.mean(force) * float(x @ x) / pull)
+    digit = 10.0 ** np.floor(np.log10(width) - 3)
+    return float(np.round(place / digit) * digit) if abs(place) > width else None
 
 
 def _require_torsion(gear: Gear, name: str) -> None:
