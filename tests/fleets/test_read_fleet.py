@@ -300,3 +300,15 @@ def test_a_gear_with_a_fault_in_one_file_is_left_out_of_all(tmp_path):
     # Of a file that cannot be read nobody knows which gears it held.
     (tmp_path / "F2.csv").write_text("nothing\n")
     assert all("F2.csv" in words for words in refused(read_fleet, tmp_path, SIZES))
+
+
+def test_shipped_priors_are_shares_of_the_readings_that_are_left():
+    frame = labelled(gears=6)
+    other = frame["gear"] == "G1"
+    assert other.any()
+    mixed = frame.assign(force_N=frame["force_N"] * np.where(other, 1000.0, 1.0))
+    left = usable(read_fleet(mixed, SIZES), skip_bad=True)
+    assert [*left.case.left_out] == ["G1"]
+    alone = usable(read_fleet(frame[~other], SIZES))
+    scale = left.case.gear.full_scale
+    assert scale == alone.case.gear.full_scale and scale.force < 1000.0
