@@ -6,6 +6,7 @@ import pytest
 import hdcal
 from hdcal.calibration.check.check import check
 from hdcal.data.case import Case, from_contact
+from hdcal.prediction.bands.predict import default_bands
 
 TRAVEL = np.linspace(0.0, 30.0, 60)
 X = np.concatenate([TRAVEL, TRAVEL[::-1]])
@@ -62,6 +63,8 @@ def test_a_capacity_is_judged_by_the_size_of_the_force(origin: float):
     case = position(origin)
     posterior = hdcal.calibrate(case, effects=["load_friction"], warmup=300, draws=500)
     assert posterior.usable
+    grid = default_bands(posterior).deformation_mm - origin
+    assert grid.min() > -0.3 and grid.max() > 31.0
     up = hdcal.margin(posterior, origin + 15.0, limit_force=50.0)
     assert up.loading_sense == 1 and up.worst.capacity_N > 63.3
     assert up.worst.force_N.median == pytest.approx(4.2 * 15.0 * 1.0075, abs=0.1)

@@ -223,12 +223,13 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
 def _default_grid(case: Case) -> np.ndarray:
     records, nominal = case.records, case.gear.nominal_deformation
     ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
-    ends += [] if lies_far(records.deformation) else [0.0]
+    zero = case.gear.contact
+    ends += [] if lies_far(records.deformation - zero) else [zero]
     ends += [] if nominal is None else [nominal]
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
-    # Not beyond zero, the unloaded gear.
-    low, high = low - beyond * float(low != 0.0), high + beyond * float(high != 0.0)
+    # Not beyond the unloaded gear.
+    low, high = low - beyond * float(low != zero), high + beyond * float(high != zero)
     for left, right in case.excluded:
         low, high = (low, left) if left >= ends[1] else (right, high)
     ends = [end for end in ends if low <= end <= high]
