@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from hdcal.screening.result import SEGMENTS
+from hdcal.quantities import FORCE
+from hdcal.screening.result import SEGMENTS, Observation
 from hdcal.screening.screen import screen
+from hdcal.screening.words import in_words
 
 RNG = np.random.default_rng(8)
 START = RNG.bit_generator.state
@@ -287,3 +289,10 @@ def test_computed_cycles_without_any_error_share_a_part():
     way = 1.0 - np.abs(np.arange(385) / 64.0 % 2.0 - 1.0)
     part = screen(way, STIFFNESS * np.maximum(way - 0.25, 0.0)).straight
     assert part.slope == pytest.approx(STIFFNESS, rel=1e-9) and not part.whole
+
+
+def test_rows_of_a_file_are_named_with_the_file_once():
+    found = Observation("wild reading", ((1, 3), (4, 4)), 2.0, "N", "cut")
+    plain, of_file = np.arange(2, 8), np.array([f"{k} of a b" for k in range(2, 8)])
+    assert in_words(found, plain, "all", FORCE).where == "rows 3-5, 6"
+    assert in_words(found, of_file, "all", FORCE).where == "rows 3-5 of a b, 6 of a b"
