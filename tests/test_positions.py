@@ -72,3 +72,26 @@ def test_a_capacity_is_judged_by_the_size_of_the_force(origin: float):
     assert down.worst.force_N.median == pytest.approx(4.2 * 15.0 * 0.9925, abs=0.1)
     with pytest.raises(hdcal.InputError, match="first contact"):
         hdcal.margin(posterior, origin + 15.0, quantity="load")
+
+
+def test_a_fleet_of_positions_has_the_numbers_of_deformations():
+    rng, tables = np.random.default_rng(5), []
+    for gear in range(6):
+        stiffness = 51.0 * (1.0 + 0.012 * rng.standard_normal())
+        force = stiffness * TRAVEL + rng.normal(0.0, 1.0, 60)
+        tables.append(np.column_stack([np.full(60, gear), TRAVEL, force]))
+    gear, x, force = np.concatenate(tables).T
+    found = []
+    for origin in ORIGINS[:2]:
+        table = {"specimen": gear, "deformation_mm": x + origin, "force_N": force}
+        found.append(hdcal.fleet(table, deformation=origin + 12.0, draws=200))
+    plain, position = found
+    assert plain.next_force and position.next_force
+    assert position.next_force.deformation_mm == pytest.approx(-200.4)
+    ends = (plain.next_force.force_N.lo, plain.next_force.force_N.hi)
+    theirs = (position.next_force.force_N.lo, position.next_force.force_N.hi)
+    assert theirs == pytest.approx(ends, rel=0.02)
+    gauges = [one.gauge_rr.percent_study_variation.median for one in found]
+    assert gauges[1] == pytest.approx(gauges[0], rel=0.02)
+    with pytest.raises(hdcal.InputError, match="deformation"):
+        hdcal.fleet(table, deformation=5000.0, draws=200)

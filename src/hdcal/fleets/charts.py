@@ -86,7 +86,8 @@ def curves_chart(fleet: "Fleet") -> Chart:
         rows = np.isin(gear, gears)
         if rows.any():
             distance = y[rows] - line[rows]
-            marks.append(Points(label=name, colour=colour, x=x[rows], y=distance))
+            read = x[rows] + fleet.readings.contact
+            marks.append(Points(label=name, colour=colour, x=read, y=distance))
     axis = load_axis(case.units, "distance from the centre")
     return Chart(panels=[Panel(x=displacement_axis(case), y=axis, marks=marks)])
 

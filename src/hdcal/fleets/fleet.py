@@ -89,11 +89,13 @@ def fleet_of(
     """Return the result of a fitted population; the arguments are those of `fleet`."""
     case, draws, seed = readings.case, fit.draws, int(fit.settings["seed"])
     largest, reasons = readings.largest, fit.failed
-    force = None
+    at, force = largest, None
+    if deformation is not None:
+        at = deformation - readings.contact
+    as_read = {"deformation_mm": at + readings.contact}
     if deformation is not None and not reasons:
         how = {"tested": largest, "seed": seed}
-        force = next_force(draws, deformation, limit_force, **how)
-    at = largest if deformation is None else deformation
+        force = next_force(draws, at, limit_force, **how).model_copy(update=as_read)
     table = gear_table(readings, fit)
     flagged = () if reasons else flagged_gears(table)
     odd = [p for gear in flagged for p in gear.quantities.values()]
@@ -112,7 +114,7 @@ def fleet_of(
         **_groups(readings, fit),
         next_gear=next_gear(draws, seed),
         next_force=force,
-        gauge_rr=gauge_rr(draws, at, force_tolerance),
+        gauge_rr=gauge_rr(draws, at, force_tolerance).model_copy(update=as_read),
         over_time=() if reasons else over_time(readings, fit),
         seed=seed,
         sampling=dict(fit.settings),

@@ -162,7 +162,8 @@ def force_findings(
             wrong.append(Finding("limit_force", words, remedy))
         return wrong
     impossible = implausible("deformation", deformation, units.displacement)
-    far = deformation, abs(readings.largest), reach, units.displacement_unit
+    from_zero, tested = deformation - readings.contact, abs(readings.largest)
+    far = from_zero, tested, reach, units.displacement_unit
     return wrong + (impossible or far_findings(*far))
 
 

@@ -173,7 +173,7 @@ class Fleet(Result):
         """Sources of scatter, their sd with its unit, and the force of one unit [N]."""
         population, unit = self.population, self.units.load_unit
         force = population.stiffness_N_per_mm.median
-        force *= abs(self.gauge_rr.deformation_mm)
+        force *= abs(self.gauge_rr.deformation_mm - self.readings.contact)
         sources = (
             ("lots", population.lot_sd_percent, "%", 0.01 * force),
             (f"{self.part}s", population.gear_sd_percent, "%", 0.01 * force),

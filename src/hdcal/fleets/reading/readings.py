@@ -157,6 +157,8 @@ class FleetReadings:
         size_ratio: stiffness of the sizes of each gear over that of the sizes in the
             gear file, by which x was multiplied, shape (g,).
         sizes: of each gear by column, if it has its own gear file.
+        contact: deformation as read of the unloaded gears, from which all else here is
+            counted [mm].
         faults: by gear; some of these are among the readings.
     """
 
@@ -166,10 +168,11 @@ class FleetReadings:
     size_ratio: np.ndarray | None = None
     sizes: Mapping[str, Sequence] | None = None
     faults: Mapping[str, Finding] = field(default_factory=dict)
+    contact: float = 0.0
 
     @property
     def largest(self) -> float:
-        """Largest deformation as read, with its sign [mm]."""
+        """Largest deformation, with its sign [mm]."""
         ratio = 1.0 if self.size_ratio is None else self.size_ratio[self.sums.gear]
         reach = self.sums.reach / ratio
         farthest = int(np.argmax(reach))
@@ -221,15 +224,16 @@ _OF_RUNS = "run_labels", "operators", "rigs", "dates"
 
 
 def fleet_readings(case: Case) -> FleetReadings:
-    """Return the readings of a case, from contact on."""
-    case = from_contact(case)
+    """Return the readings of a case."""
+    contact, case = case.gear.contact, from_contact(case)
     records = case.records
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
     (gear, run), index = np.unique(labels, axis=1, return_inverse=True)
     read, force = np.asarray(records.deformation), np.asarray(records.force)
     x = read * relative_modulus(case.gear, np.asarray(records.temperature))
     v = reading_vectors(x, np.asarray(records.sense), force)
-    return readings_of(case, gear, run, RowSums.of(index.ravel(), v, read))
+    found = readings_of(case, gear, run, RowSums.of(index.ravel(), v, read))
+    return replace(found, contact=contact)
 
 
 def readings_of(
