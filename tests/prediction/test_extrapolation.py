@@ -129,3 +129,18 @@ def test_each_draw_has_a_law_by_its_probability():
         np.testing.assert_allclose(found.mean(axis=0), bend.chances @ law, rtol=1e-3)
     law = int(np.searchsorted(np.cumsum(bend.chances), 0.5))
     np.testing.assert_allclose(drawn[1][50_000], bend.law(at)[1][law])
+
+
+def test_a_loop_in_the_discrepancy_goes_on_beyond_the_tested_range():
+    """Friction of 1.5 N, of which the model knows nothing."""
+    x = np.concatenate([np.linspace(0.04, 0.5, 40), np.linspace(0.5, 0.04, 40)])
+    sense, rng = np.repeat([1.0, -1.0], 40), np.random.default_rng(7)
+    force = 210.0 * x + 1.5 * sense + rng.normal(0.0, 0.3, 80)
+    case = hdcal.read_case({"deformation_mm": x, "force_N": force}, range="all")
+    posterior = hdcal.calibrate(case, with_gap=True, warmup=300, draws=500)
+    assert posterior.usable
+    at = np.array([0.3, 0.49, 0.52, 0.6])
+    up, down = (hdcal.predict(posterior, at, direction=way) for way in ("up", "down"))
+    width = up.with_gap_median_N - down.with_gap_median_N
+    assert width == pytest.approx(np.full(4, 3.0), abs=0.4)
+    assert width[2:] == pytest.approx(width[1] * np.ones(2), abs=0.1)

@@ -100,7 +100,8 @@ def forces_of_draws(
     """Compute the force of every draw, its slope by the stiffness, and the noise.
 
     The last rows of the path are the conditions asked for. Factor and `moved` are as in
-    `force_of`; `share` is the part of the fitted discrepancy that acts.
+    `force_of`; `share` is the part of the fitted discrepancy that acts. Half a loop
+    acts whole: it does not end with the tested range.
 
     Returns:
         Force (draw, node, asked) and its derivative by the factor [N], logarithms of
@@ -110,7 +111,12 @@ def forces_of_draws(
     """
 
     def of_draw(value, factor, moved):
-        left = share * fitted_discrepancy(problem, value, path, quantity)[-asked:]
+        middle = replace(path, sense=jnp.zeros_like(path.sense))
+        whole, mean = (
+            fitted_discrepancy(problem, value, rows, quantity)[-asked:]
+            for rows in (path, middle)
+        )
+        left = whole - (1.0 - share) * mean
 
         def force(factor):
             mean, noise = force_of(
