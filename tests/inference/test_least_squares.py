@@ -37,8 +37,8 @@ def test_stiffness_and_interval_are_those_of_least_squares(rows: int, origin: fl
     half = stats.t.ppf(0.975, rows - 2) * line.stderr
     ends = np.quantile(stiffness(x, y), [0.025, 0.5, 0.975])
     expected = line.slope + half * np.array([-1.0, 0.0, 1.0])
-    # Ends of 16,000 draws have a Monte Carlo error of 0.6 % of the width.
-    np.testing.assert_allclose(ends, expected, atol=0.02 * 2.0 * half)
+    # Of 16,000 draws a fourth are effective: ends err by 1.2 % of the width (sd).
+    np.testing.assert_allclose(ends, expected, atol=0.045 * 2.0 * half)
 
 
 @pytest.fixture(scope="module")
@@ -55,4 +55,5 @@ def test_scale_and_origin_of_both_channels_change_nothing(
 ):
     moved = stiffness(scale_x * X + shift_x, scale_y * Y + shift_y)
     found = np.quantile(moved, [0.025, 0.5, 0.975]) * scale_x / scale_y
-    np.testing.assert_allclose(found, known, atol=0.03 * float(known[2] - known[0]))
+    # As above, of both.
+    np.testing.assert_allclose(found, known, atol=0.06 * float(known[2] - known[0]))
