@@ -70,6 +70,10 @@ def test_a_capacity_is_judged_by_the_size_of_the_force(origin: float):
     assert up.worst.force_N.median == pytest.approx(4.2 * 15.0 * 1.0075, abs=0.1)
     down = hdcal.margin(posterior, origin + 15.0, direction="down")
     assert down.worst.force_N.median == pytest.approx(4.2 * 15.0 * 0.9925, abs=0.1)
+    assert hdcal.predict(posterior, [origin + 30.0]).mean_N.median > 125.0
+    for ask in (hdcal.margin, hdcal.predict):
+        with pytest.raises(hdcal.InputError, match="far beyond"):
+            ask(posterior, 15.0)
     with pytest.raises(hdcal.InputError, match="first contact"):
         hdcal.margin(posterior, origin + 15.0, quantity="load")
 
@@ -94,4 +98,4 @@ def test_a_fleet_of_positions_has_the_numbers_of_deformations():
     gauges = [one.gauge_rr.percent_study_variation.median for one in found]
     assert gauges[1] == pytest.approx(gauges[0], rel=0.02)
     with pytest.raises(hdcal.InputError, match="deformation"):
-        hdcal.fleet(table, deformation=5000.0, draws=200)
+        hdcal.fleet(table, deformation=12.0, draws=200)

@@ -133,7 +133,9 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         words = "while the {displacement} is held the {load} {way} by {size}"
         yield Contrast("time", _held(records), _RISES, words)
     words = "the {load} drifts {way} by {size} within a run"
-    yield Contrast("time", np.asarray(records.time), _UP, words)
+    begin = np.full(np.max(records.run) + 1, np.inf)
+    np.minimum.at(begin, records.run, records.time)
+    yield Contrast("time", records.time - begin[records.run], _UP, words)
     words = "from the first reading to the last the {load} {way} by {size}"
     yield Contrast("order", np.linspace(0.0, 1.0, len(x)), _RISES, words)
     # Whole cycles: loading and unloading may differ in slope.

@@ -154,7 +154,7 @@ def force_findings(
     readings: FleetReadings, deformation: float | None, limit_force: float | None
 ) -> list[Finding]:
     """Return what is wrong with a deformation, which may be None, and a capacity."""
-    units, reach = readings.case.units, readings.case.gear.reach
+    gear, units = readings.case.gear, readings.case.units
     wrong = implausible("limit_force", limit_force, "sigma")
     if deformation is None:
         words, remedy = "has no deformation", "Give `deformation` too"
@@ -162,8 +162,7 @@ def force_findings(
             wrong.append(Finding("limit_force", words, remedy))
         return wrong
     impossible = implausible("deformation", deformation, units.displacement)
-    from_zero, tested = deformation - readings.contact, abs(readings.largest)
-    far = from_zero, tested, reach, units.displacement_unit
+    far = gear, units, deformation, abs(readings.largest), readings.contact
     return wrong + (impossible or far_findings(*far))
 
 

@@ -1,6 +1,5 @@
 """Conditions and population of a force, and what the readings tested."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
@@ -16,6 +15,7 @@ from hdcal.inference.force_model.problem import Problem
 from hdcal.inference.force_model.values import Values
 from hdcal.prediction.forces import Quantity
 from hdcal.prediction.joint import JointModel
+from hdcal.quantities import Quantities
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -29,6 +29,9 @@ NEAR_K, NEAR_MM = 1.0, 1e-9
 # A deformation this many times the largest that was read is a wrong unit; so is a
 # force this many times larger or smaller than the usual.
 OFF = 100.0
+# Where positions were read, one so many times as far from the unloaded part is rather a
+# deformation.
+_OFF_POSITION = 5.0
 # Draws that must lie beyond a bound to locate it.
 _BEYOND = 10
 # A rarer case than one in a million rests on the normal law of the scatter alone:
@@ -160,18 +163,20 @@ def _within(values, measured, slack: float) -> np.ndarray:
 
 
 def far_findings(
-    deformation: float, tested: float, reach: float = math.inf, unit: str = "mm"
+    gear: Gear, units: Quantities, deformation: float, tested: float, zero: float
 ) -> list[Finding]:
     """Return a finding where a deformation can only be in a wrong unit.
 
-    Tested is the largest size that was read, the reach what no gear of this radius
-    reaches, in the same unit.
+    `tested` is how far from `zero`, the unloaded gear, was read [mm].
     """
-    if abs(deformation) < reach and abs(deformation) <= tested * OFF:
+    size, unit = abs(deformation - zero), units.displacement_unit
+    most = tested * (_OFF_POSITION if zero else OFF)
+    if size < gear.reach and size <= most:
         return []
     words = (
         f"{deformation:g} {unit} is far beyond the readings, up to {tested:g} {unit}"
     )
+    words += f" from {zero:g} {unit}" if zero else ""
     return [Finding("deformation", words, f"Give the deformation in {unit}")]
 
 

@@ -25,9 +25,9 @@ QUANTITIES = (*DIMENSIONS, *LABELS)
 # case without accents. One is misspelt, as loggers spell it.
 _ALIASES = {
     "deformation": """deformation displacement displacment deflection travel stroke
-        extension compression crosshead traverse lvdt disp defl verformung verschiebung
-        hub weg standardweg traversenweg federweg deplacement course fleche spostamento
-        corsa 位移 变形 行程 変位 変形 伸び ストローク""",
+        extension compression crosshead traverse lvdt disp displ defl verformung
+        verschiebung hub weg standardweg traversenweg federweg deplacement course fleche
+        spostamento corsa 位移 变形 行程 変位 変形 伸び ストローク""",
     "force": """force load kraft last standardkraft prufkraft zugkraft druckkraft
         federkraft charge effort forza carico 力 载荷 负荷 荷重""",
     "torque": "torque moment drehmoment couple coppia 扭矩 转矩 トルク",
@@ -35,7 +35,7 @@ _ALIASES = {
         angolo 角度 转角 回転角""",
     "temperature": "temperature temp temperatur temperatura 温度",
     "time": "time zeit prufzeit laufzeit temps duree tempo 时间 時間",
-    "run": """run mounting repeat lauf messung versuch einspannung aufspannung
+    "run": """run mounting mount repeat lauf messung versuch einspannung aufspannung
         wiederholung essai""",
     "specimen": """specimen gear serial seriennummer probe prufling eprouvette provino
         campione 试样 試験片""",

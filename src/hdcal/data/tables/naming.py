@@ -15,7 +15,7 @@ def check_names(
         words = f"no header row names the {len(table.headers)} columns: the first row "
         words += "contains numbers"
         remedy = "Add a header row, or name the columns by their numbers, as in "
-        remedy += "`columns` 'deformation=1[mm]' and `columns` 'force=2[kN]'"
+        remedy += "`columns` deformation=1[mm] and `columns` force=2[kN]"
         findings.refuse(words, remedy, table.header_row)
     for quantity in (name for name in mapping if name not in QUANTITIES):
         words = f"`columns` {quantity}=… is not a known quantity"

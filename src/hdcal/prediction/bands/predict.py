@@ -176,11 +176,12 @@ def _deformation_findings(
     case: Case, deformation: np.ndarray, direction: str | None
 ) -> list[Finding]:
     """Return what is wrong with deformations [mm], such as another unit."""
-    tested = float(np.max(np.abs(case.records.deformation)))
     if wrong := implausible("deformation", deformation, case.units.displacement):
         return wrong
-    worst = float(deformation[np.argmax(np.abs(deformation))])
-    wrong = far_findings(worst, tested, case.gear.reach, case.units.displacement_unit)
+    zero = case.gear.contact
+    worst = float(deformation[np.argmax(np.abs(deformation - zero))])
+    tested = float(np.max(np.abs(case.records.deformation - zero)))
+    wrong = far_findings(case.gear, case.units, worst, tested, zero)
     sense = SENSE.get(direction or "", _loading(deformation, case))
     each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
     return wrong + next(filter(None, each), [])

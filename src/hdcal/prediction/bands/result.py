@@ -73,8 +73,10 @@ class Bands(Result):
 
     @property
     def mean_N(self) -> Interval:
-        """Mean force at the first row."""
+        """Mean force at the first row, with the discrepancy where one was fitted."""
         ends = (self.physics_median_N, self.physics_lo_N, self.physics_hi_N)
+        if np.isfinite(self.with_gap_median_N[0]):
+            ends = (self.with_gap_median_N, self.with_gap_lo_N, self.with_gap_hi_N)
         median, lo, hi = (float(end[0]) for end in ends)
         return Interval(median=median, lo=lo, hi=hi)
 

@@ -147,14 +147,14 @@ def _deformation(
     posterior: Posterior, deformation: float, movement: float
 ) -> Iterator[Finding]:
     gear, units = posterior.case.gear, posterior.case.units
-    tested = float(np.max(np.abs(posterior.case.records.deformation)))
+    tested = float(np.max(np.abs(posterior.case.records.deformation - gear.contact)))
     name, unit = "deformation", units.displacement_unit
     if wrong := implausible(name, deformation, units.displacement):
         yield from wrong
     elif deformation == 0.0:
         words = f"the {units.displacement} is 0"
         yield Finding(name, words, f"Give a {units.displacement} in {unit}, not 0")
-    elif wrong := far_findings(deformation, tested, gear.reach, unit):
+    elif wrong := far_findings(gear, units, deformation, tested, gear.contact):
         yield from wrong
     else:
         yield from excluded_findings(posterior.case, deformation, movement)
