@@ -170,7 +170,7 @@ def far_findings(
     `tested` is how far from `zero`, the unloaded gear, was read [mm].
     """
     size, unit = abs(deformation - zero), units.displacement_unit
-    most = tested * (_OFF_POSITION if zero else OFF)
+    most = tested * (_OFF_POSITION if abs(zero) > tested else OFF)
     if size < gear.reach and size <= most:
         return []
     words = (
