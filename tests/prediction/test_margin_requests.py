@@ -12,6 +12,7 @@ import hdcal
 from hdcal.data.prior import Prior
 from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
+from hdcal.prediction.conditions import excluded_findings
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +129,18 @@ def test_models_have_probabilities_and_are_of_the_same_data(one):
         with pytest.raises(InputError) as refused:
             hdcal.margin(models, 0.4)
         assert fields(refused) == ["models"]
+
+
+@pytest.mark.parametrize("left_out", [1, -1])
+def test_a_movement_whose_readings_were_left_out_is_refused(one, left_out: int):
+    """Named by what the deformation does, whatever side is loaded."""
+    case = replace(one.case, excluded_sense=left_out)
+    movement = {1: "increases", -1: "decreases"}[left_out]
+    (found,) = excluded_findings(case, 0.3, float(left_out))
+    assert found.file == "direction" and movement in found.problem
+    assert not excluded_findings(case, 0.3, -float(left_out))
+
+
+def test_a_member_is_named_by_its_population(one):
+    of_load = hdcal.margin(one, 0.4, quantity="load")
+    assert (hdcal.margin(one, 0.4).member, of_load.member) == ("reading", "load")
