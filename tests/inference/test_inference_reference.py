@@ -11,6 +11,7 @@ from diagnosis_cases import rich, simulated
 from posteriors import batch, single, with_discrepancy
 from reference import assert_reference
 from rigs import cycles, make_records, ramp
+from slices import slice_of
 from structures import form_of
 
 from hdcal.calibration.calibrate import choose_effects
@@ -84,7 +85,9 @@ def model_of(name: str) -> tuple[Case, Problem]:
     return case, build_problem(case, effect_priors(), chosen, structure=form)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    "name", slice_of(MODELS, MODELS.keys() - {"stated", "mixture"})
+)
 def test_density_and_its_mode_are_those_of_the_reference(name: str):
     case, problem = model_of(name)
     mode = laplace.fit(problem)
