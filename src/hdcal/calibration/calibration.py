@@ -4,11 +4,9 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Literal, get_args
 
-import numpy as np
 from pydantic import Field, InstanceOf
 
 from hdcal.calibration.charts import calibration_chart, residual_chart
-from hdcal.data.case import from_contact
 from hdcal.data.loading import movement_words
 from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
 from hdcal.errors import Finding, InputError
@@ -81,8 +79,8 @@ class Calibration(PosteriorResult):
         case = self.posterior.case
         if case.excluded_sense == 0:
             return ""
-        read = np.asarray(from_contact(case).records.deformation)
-        return movement_words(read, self.units.displacement)[case.excluded_sense]
+        words = movement_words(case.from_unloaded, self.units.displacement)
+        return words[case.excluded_sense]
 
     @property
     def known(self) -> frozenset[str]:

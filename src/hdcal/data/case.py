@@ -115,6 +115,11 @@ class Case:
     screening: Screening | None = None
     units: Quantities = FORCE
 
+    @property
+    def from_unloaded(self) -> np.ndarray:
+        """Deformation of each row from the unloaded part, shape (n,) [mm]."""
+        return np.asarray(self.records.deformation) - self.gear.contact
+
     def __repr__(self) -> str:
         rows = len(self.records.force)
         return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"
@@ -151,7 +156,7 @@ class Case:
 
 def from_contact(case: Case) -> Case:
     """Return a case whose deformations are counted from the unloaded part."""
-    gear, records, zero = case.gear, case.records, case.gear.contact
+    gear, zero = case.gear, case.gear.contact
     if zero == 0.0:
         return case
     prior = gear.priors["deformation_offset"]
@@ -161,7 +166,7 @@ def from_contact(case: Case) -> Case:
     return replace(
         case,
         gear=replace(gear, priors=priors),
-        records=replace(records, deformation=records.deformation - zero),
+        records=replace(case.records, deformation=case.from_unloaded),
     )
 
 

@@ -80,9 +80,7 @@ class Records(_InDoublePrecision):
 FEATURE_WORDS = {"holds or rates": "holds or several rates"}
 # Readings of a test that begins at the origin have their middle at half their range.
 _FAR = 1.0
-
-
-# Source of the prior of their zero.
+# Source of the prior of the zero of readings that are positions.
 OF_POSITIONS = "readings of a position: where their straight line has no force"
 
 

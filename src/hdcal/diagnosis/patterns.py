@@ -15,7 +15,7 @@ from scipy.special import ndtri
 from hdcal.data.case import Case
 from hdcal.data.loading import loading_side
 from hdcal.data.prior import Prior
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.diagnosis.which import MATTERS
 from hdcal.evidence.base_model import moments
 from hdcal.evidence.linear_problem import LinearProblem, padded_records
@@ -133,9 +133,9 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         words = "while the {displacement} is held the {load} {way} by {size}"
         yield Contrast("time", _held(records), _RISES, words)
     words = "the {load} drifts {way} by {size} within a run"
-    begin = np.full(np.max(records.run) + 1, np.inf)
-    np.minimum.at(begin, records.run, records.time)
-    yield Contrast("time", records.time - begin[records.run], _UP, words)
+    # A clock may run on from run to run.
+    clock = less_run_means(np.asarray(records.time), np.asarray(records.run))
+    yield Contrast("time", clock, _UP, words)
     words = "from the first reading to the last the {load} {way} by {size}"
     yield Contrast("order", np.linspace(0.0, 1.0, len(x)), _RISES, words)
     # Whole cycles: loading and unloading may differ in slope.

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.case import Case, from_contact
+from hdcal.data.case import Case
 from hdcal.data.loading import loading
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.posterior import Posterior
@@ -37,8 +37,7 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
         return f"{low if low == high else f'{low} … {high}'} {shown}"
 
     moves = {"loading": 1, "holding": 0, "unloading": -1}
-    from_zero = np.asarray(from_contact(case).records.deformation)
-    way = loading(from_zero, np.asarray(records.direction))
+    way = loading(case.from_unloaded, np.asarray(records.direction))
     count = {word: np.count_nonzero(way == sign) for word, sign in moves.items()}
     warmth = ends(records.temperature, "°C")
     if "temperature" not in records.known:

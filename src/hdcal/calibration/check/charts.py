@@ -28,7 +28,7 @@ def _members(case: Case) -> Iterator[Points]:
     """Yield the rows of each specimen, or of each run, of one run of each movement."""
     records = case.records
     read, kind = np.asarray(records.deformation), ""
-    movements = movement_words(read - case.gear.contact, case.units.displacement)
+    movements = movement_words(case.from_unloaded, case.units.displacement)
     names = [*movements.values()]
     index = (np.asarray(records.sense) != next(iter(movements))).astype(int)
     for each, labels in (("run", case.run_labels), ("specimen", case.specimen_labels)):

@@ -8,7 +8,7 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
 from hdcal.calibration.straight_line import takes_straight_part
-from hdcal.data.case import Case, from_contact
+from hdcal.data.case import Case
 from hdcal.data.gear_file.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_file.schema import certificates_in
 from hdcal.data.loading import loading
@@ -222,8 +222,7 @@ def _implausible_K(case: Case) -> tuple[float, float, float] | None:
 
 def _data(case: Case) -> CheckedData:
     records = case.records
-    from_zero = np.asarray(from_contact(case).records.deformation)
-    movement = loading(from_zero, np.asarray(records.direction))
+    movement = loading(case.from_unloaded, np.asarray(records.direction))
     loaded, held, unloaded = (int(np.sum(movement == sign)) for sign in (1, 0, -1))
     return CheckedData(
         rows=len(records.force),

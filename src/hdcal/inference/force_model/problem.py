@@ -187,13 +187,9 @@ def build_problem(
         specimens=members.get("specimen", 0),
         integrated=tuple(integrated),
         contact=case.gear.contact,
-        centre=_middle(records.deformation) - case.gear.contact,
+        centre=float(np.min(case.from_unloaded) + np.max(case.from_unloaded)) / 2.0,
         level=float(np.mean(records.force)),
     )
-
-
-def _middle(values: Array) -> float:
-    return (float(np.min(values)) + float(np.max(values))) / 2.0
 
 
 def _kept_rows(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.case import Case, from_contact
+from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Records, lies_far
 from hdcal.data.theory_names import SPRING
@@ -166,7 +166,7 @@ def _numbers(name: str, given: Any) -> np.ndarray:
 
 def _loading(at: np.ndarray, case: Case) -> np.ndarray:
     """Return the direction of loading of each row, +1 where the deformation rises."""
-    at, read = at - case.gear.contact, from_contact(case).records.deformation
+    at, read = at - case.gear.contact, case.from_unloaded
     # A gear at rest is loaded as the tested one was.
     tested = np.min(read) + np.max(read)
     return np.where(np.where(at == 0.0, tested, at) < 0.0, -1.0, 1.0)
@@ -180,7 +180,7 @@ def _deformation_findings(
         return wrong
     zero = case.gear.contact
     worst = float(deformation[np.argmax(np.abs(deformation - zero))])
-    tested = float(np.max(np.abs(case.records.deformation - zero)))
+    tested = float(np.max(np.abs(case.from_unloaded)))
     wrong = far_findings(case.gear, case.units, worst, tested, zero)
     sense = SENSE.get(direction or "", _loading(deformation, case))
     each = (excluded_findings(case, *pair) for pair in np.broadcast(deformation, sense))
@@ -225,7 +225,7 @@ def _default_grid(case: Case) -> np.ndarray:
     records, nominal = case.records, case.gear.nominal_deformation
     ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
     zero = case.gear.contact
-    ends += [] if lies_far(records.deformation - zero) else [zero]
+    ends += [] if lies_far(case.from_unloaded) else [zero]
     ends += [] if nominal is None else [nominal]
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)

@@ -147,7 +147,7 @@ def _deformation(
     posterior: Posterior, deformation: float, movement: float
 ) -> Iterator[Finding]:
     gear, units = posterior.case.gear, posterior.case.units
-    tested = float(np.max(np.abs(posterior.case.records.deformation - gear.contact)))
+    tested = float(np.max(np.abs(posterior.case.from_unloaded)))
     name, unit = "deformation", units.displacement_unit
     if wrong := implausible(name, deformation, units.displacement):
         yield from wrong
