@@ -1,7 +1,7 @@
 """Classes of effects, and the components that act in draws of each hypothesis.
 
-The gap is the sum of the acting components, with the base model projected out. A
-component acts in a draw where the rows show it: a tiny coefficient does not act.
+The gap is the sum of the components, with the base model projected out. A component
+acts in a draw where the rows show it: a tiny coefficient does not act.
 """
 
 from collections import defaultdict
@@ -165,9 +165,7 @@ def _drawn(
     visible = np.sum((noise.weight * curves) ** 2, axis=2)
     shown = visible > _SHOWN * problem.noise_sd**2
     shown &= np.mean(curves**2, axis=2) > least**2
-    gaps = np.einsum("kd,kdn->dn", shown, curves)
-    # A component that points away from the gap only compensates another one.
-    shown &= np.einsum("kdn,dn->kd", curves, gaps) > 0.0
+    gaps = np.sum(curves, axis=0)
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)
         acts = [k for k, on in enumerate(pattern) if on]

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # without a model with a discrepancy.
 _LEAST_SHARE, _MOST_LEFT_OUT = 0.05, 0.02
-# Rows from which on a model with a loop and a discrepancy takes minutes to calibrate.
-_MOST_ROWS = 2_000
+# Rows from which on a model with a loop and a discrepancy takes minutes to calibrate,
+# and iterations by which a sampler in whitened coordinates has found its step.
+_MOST_ROWS, _WARMUP = 1_000, 500
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class Refits:
 
 
 def rows_to_calibrate(case: Case) -> Case:
-    """Return the case with at most about 2,000 single rows, the turns among them."""
-    rows = len(case.records.force)
-    if rows <= _MOST_ROWS:
+    """Return the case with at most about 1,000 rows, the turns among them."""
+    few = thin_rows(case, _MOST_ROWS)
+    if few is case:
         return case
-    few = thin_rows(case, -(-rows // _MOST_ROWS), turns=True)
-    words = f"{len(few.records.force)} of {rows} rows were used for calibration"
+    left, rows = len(few.records.force), len(case.records.force)
+    words = f"{left} of {rows} rows were used for calibration"
     return replace(few, notes=(*few.notes, words))
 
 
@@ -86,6 +87,7 @@ def refit(
             effects=tuple(sorted(parts - {UNKNOWN})),
             with_gap=UNKNOWN in parts,
             adapt_noise=False,
+            warmup=_WARMUP,
             seed=seed,
             registry=library,
             progress=progress,

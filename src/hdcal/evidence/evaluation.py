@@ -12,7 +12,7 @@ from hdcal.evidence.items import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.marginal import Marginal
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Context, Part
+from hdcal.evidence.parts import Context, Level, Part
 from hdcal.evidence.projection import Block, Projection
 
 # Relative sds by which a shape may deviate from the library's, and their probabilities.
@@ -22,6 +22,8 @@ _TOLERANCE_WEIGHTS = np.array([0.4, 0.3, 0.3])
 _NARROW = 4
 # Atoms of each effect that are evaluated given tolerances and contexts.
 _CHOSEN = 8
+# Sizes of a space of less probability are not drawn.
+_UNLIKELY = 0.01
 
 
 @dataclass
@@ -148,50 +150,58 @@ class Evaluated:
         place = int(members[row]), int(column)
         if table is self.spaces:
             space = [*self.selection.spaces, *self.extra][place[0]]
-            return _space_part(space, place, spread)
+            return _space_part(space, place, spread, table[place[0]])
         return self._atom_part(component, place, spread)
 
     def _atom_part(self, component: int, place: tuple[int, int], spread: float) -> Part:
-        selection, (row, column) = self.selection, place
+        selection, row = self.selection, place[0]
         atom = selection.atoms.pick(np.array([row]))
         size = atom.bounded(self.atoms.mean[place][None])
         of_component = selection.atoms.owner == component
         least = selection.atoms.amplitude.low[of_component].min()
         low, high = atom.amplitude.low[0], atom.amplitude.high[0]
-        log_chance = self.atoms.log_evidence[row]
-        chance = np.exp(log_chance - np.logaddexp.reduce(log_chance))
-        loose = _TOLERANCES[:, None, None] * selection.tolerance[row]
-        levels = tuple(zip(map(float, chance), loose, strict=True))
+        sd = np.maximum(np.abs(size), self.atoms.sd[place])
+        chances = _probabilities(self.atoms.log_evidence[row])
         return Part(
             component=component,
             offset=atom.offset[0],
             columns=atom.slope,
             mean=size,
-            sd=np.maximum(np.abs(size), self.atoms.sd[place]),
-            loose=levels[column][1],
+            loose=selection.tolerance[row],
+            levels=tuple(
+                Level(float(chances[k]), sd, float(_TOLERANCES[k]))
+                for k in np.argsort(-chances)
+            ),
             one_sided=bool(least >= 0.0),
             shape=int(atom.shape[0]),
             chord=(float(low), float(high)) if np.isfinite(high) else (0.0, 1.0),
             place=place,
             spread=spread,
-            levels=levels,
         )
 
 
-def _space_part(space: Space, place: tuple[int, int], spread: float) -> Part:
+def _probabilities(log_evidence: Float[np.ndarray, " t"]) -> Float[np.ndarray, " t"]:
+    return np.exp(log_evidence - np.logaddexp.reduce(log_evidence))
+
+
+def _space_part(
+    space: Space, place: tuple[int, int], spread: float, log_evidence: np.ndarray
+) -> Part:
     count, rows = space.columns.shape
-    fixed = np.zeros((0, rows))
+    chances = _probabilities(log_evidence)
+    ranked = [k for k in np.argsort(-chances) if chances[k] > _UNLIKELY]
     return Part(
         component=space.owner,
         offset=np.zeros(rows),
         columns=space.columns,
         mean=np.zeros(count),
-        sd=np.full(count, space.scale[place[1]]),
-        loose=fixed,
+        loose=np.zeros((0, rows)),
+        levels=tuple(
+            Level(float(chances[k]), np.full(count, space.scale[k])) for k in ranked
+        ),
         shape=space.shape,
         place=place,
         spread=spread,
-        levels=((1.0, fixed),),
     )
 
 

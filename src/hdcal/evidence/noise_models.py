@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.special import betaln, entr, expit
-from scipy.stats import binomtest
+from scipy.stats import hypergeom
 
 from hdcal.data.prior import Prior
 from hdcal.evidence.linear_problem import LinearProblem
@@ -32,7 +32,7 @@ _SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
-# Significance level of the sign test of neighbouring outliers.
+# Significance level from which on outliers are neighbours by more than chance.
 _CHANCE = 0.01
 
 
@@ -62,24 +62,6 @@ def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
         correlations += [middle, longest]
     log_prior = -float(np.log(len(correlations)))
     return [NoiseModel("", problem.weight, float(c), log_prior) for c in correlations]
-
-
-def correlated_noise(
-    problem: LinearProblem, error: Float[np.ndarray, " n"], largest: float
-) -> NoiseModel:
-    """Return equal noise with the correlation that errors [N] have, up to the largest.
-
-    Its prior is the mass of a normal around it: uniform over the correlation times the
-    width of its likelihood.
-    """
-    follows = problem.before >= 0
-    error = error * problem.weight
-    last = error[problem.before[follows]]
-    found = float(error[follows] @ last / max(last @ last, 1e-300))
-    found = float(np.clip(found, 0.0, largest))
-    sd = np.sqrt((1.0 - found**2) / max(np.count_nonzero(follows), 1))
-    log_mass = float(np.log(min(np.sqrt(2.0 * np.pi) * sd, 1.0)))
-    return NoiseModel("", problem.weight, found, log_mass)
 
 
 def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel]:
@@ -139,7 +121,7 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    There is none where wild rows agree with their neighbours: that is structure. With
+    There is none where wild rows are neighbours: that is structure. With
     any probabilities that rows are wild the evidence of every hypothesis is a lower
     bound, tight where rows are clearly wild or not; these come from an EM fit. `fitted`
     maps weights of rows to the mean reading given some hypothesis.
@@ -149,7 +131,7 @@ def outliers(
         (_fit_outliers(problem, ratio, fitted) for ratio in ratios),
         key=lambda fit: fit.bound,
     )
-    if _agree(best.wild, problem.before):
+    if _clustered(problem, best.wild):
         return []
     grid = sorted({0.0, correlation})
     log_prior = np.log(PRIOR_ODDS) + best.log_factor - np.log(len(ratios) * len(grid))
@@ -189,9 +171,18 @@ def _beta_numbers(prior: Prior) -> tuple[float, float]:
     return mean * total, (1.0 - mean) * total
 
 
-def _agree(wild: Float[np.ndarray, " n"], before: Int[np.ndarray, " n"]) -> bool:
-    """Whether wild rows err too often to the same side as wild rows before them."""
-    pairs = wild * np.where(before >= 0, wild[before], 0.0)
-    same, all_pairs = int(np.sum(pairs > 0.0)), int(np.count_nonzero(pairs))
-    found = all_pairs and binomtest(same, all_pairs, 0.5, "greater").pvalue < _CHANCE
-    return bool(found)
+def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
+    """Whether wild rows are neighbours more often than rows at random places.
+
+    Neighbours in time, or in the deformation in one direction. The number of runs of
+    wild rows is hypergeometric (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940).
+    """
+    records, rows = problem.records, len(wild)
+    count = int(np.count_nonzero(wild))
+    place = np.lexsort([records.deformation, records.sense])
+    runs = [
+        np.count_nonzero(np.diff((wild[order] != 0.0).astype(int), prepend=0) == 1)
+        for order in (np.arange(rows), place)
+    ]
+    chance = hypergeom.cdf(runs, rows, rows - count + 1, count)
+    return bool(count and np.min(chance) < _CHANCE / len(runs))

@@ -19,32 +19,47 @@ class Context(NamedTuple):
     columns: Float[np.ndarray, "c n"]
 
 
+class Level(NamedTuple):
+    """Sizes that the coefficients of a part may have, with their probability.
+
+    `sd` is that of a; `tolerance` is the relative sd of the deviation of the shape.
+    """
+
+    probability: float
+    sd: Float[np.ndarray, " j"]
+    tolerance: float = 0.0
+
+
 class Part(NamedTuple):
     """One component at its most probable item: offset + columns · a + loose columns.
 
     Attributes:
         mean: of a, as the item alone has it.
-        loose: columns of the shape's tolerance [N per sd].
+        loose: columns of the shape's tolerance at a relative sd of 1 [N].
+        levels: what its coefficients may be, the most probable first.
         one_sided: whether a is not negative.
         shape: index of the point of the shape parameters; −1 without one.
         chord: two amplitudes between which one column is exact.
         place: row and column of the item in a selection; None where it is several.
         spread: log evidence of the component less that of the item, where it was found.
-        levels: probability of each tolerance of the shape, with its loose columns.
     """
 
     component: int
     offset: Float[np.ndarray, " n"]
     columns: Float[np.ndarray, "j n"]
     mean: Float[np.ndarray, " j"]
-    sd: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
+    levels: tuple[Level, ...]
     shape: int
     place: tuple[int, int] | None
     spread: float
-    levels: tuple[tuple[float, Float[np.ndarray, "l n"]], ...]
     one_sided: bool = False
     chord: tuple[float, float] = (0.0, 1.0)
+
+    @property
+    def sd(self) -> Float[np.ndarray, " j"]:
+        """Prior sd of a at the most probable level."""
+        return self.levels[0].sd
 
     @property
     def width(self) -> int:
@@ -56,10 +71,20 @@ class Part(NamedTuple):
         """The coefficient of the first column at which a is zero."""
         return -float(self.mean[0] / self.sd[0])
 
-    def context(self) -> Context:
-        """Return the part as one of the base."""
-        columns = np.concatenate([self.sd[:, None] * self.columns, self.loose])
+    def sds(self, level: Level) -> Float[np.ndarray, " w"]:
+        """Return the prior sds of the coefficients of all columns."""
+        return np.append(level.sd, np.full(len(self.loose), level.tolerance))
+
+    @property
+    def unit(self) -> Context:
+        """The part at its mean, and all columns at unit size."""
+        columns = np.concatenate([self.columns, self.loose])
         return Context(self.offset + self.mean @ self.columns, columns)
+
+    def context(self) -> Context:
+        """Return the part at its most probable level as one of the base."""
+        offset, columns = self.unit
+        return Context(offset, self.sds(self.levels[0])[:, None] * columns)
 
 
 def merged(parts: Sequence[Part]) -> Part:
@@ -68,7 +93,8 @@ def merged(parts: Sequence[Part]) -> Part:
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("columns", "mean", "sd")
     )
-    return parts[0]._replace(columns=columns, mean=mean, sd=sd, place=None)
+    levels = (Level(1.0, sd),)
+    return parts[0]._replace(columns=columns, mean=mean, levels=levels, place=None)
 
 
 class DrawnCurves(NamedTuple):
@@ -112,12 +138,30 @@ def posterior(
     """Return the posterior of base and parts at the reference noise sd."""
     offset, columns = join(problem, parts)
     columns = np.concatenate([problem.X.T, columns])
-    both = np.concatenate([columns, (problem.y - offset)[None]])
-    white = problem.whiten(both, noise.weight, noise.correlation) / problem.noise_sd
-    precision = white[:-1] @ white[:-1].T + np.eye(len(columns))
-    factor = np.linalg.inv(np.linalg.cholesky(precision))
-    mean = factor.T @ (factor @ (white[:-1] @ white[-1]))
+    products = _products(problem, noise, problem.y - offset, columns)
+    mean, factor = _solved(products, np.ones(len(columns)))
     return LinearPosterior(mean, factor, columns.T, offset)
+
+
+def _products(
+    problem: LinearProblem,
+    noise: NoiseModel,
+    error: Float[np.ndarray, " n"],
+    columns: Float[np.ndarray, "p n"],
+) -> Float[np.ndarray, "q q"]:
+    """Return inner products of columns and, last, an error in whitened rows."""
+    both = np.concatenate([columns, error[None]])
+    white = problem.whiten(both, noise.weight, noise.correlation) / problem.noise_sd
+    return white @ white.T
+
+
+def _solved(
+    products: Float[np.ndarray, "q q"], sd: Float[np.ndarray, " p"]
+) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "p p"]]:
+    """Return mean and factor as in `LinearPosterior`, given sds of coefficients."""
+    precision = sd[:, None] * products[:-1, :-1] * sd + np.eye(len(sd))
+    factor = np.linalg.inv(np.linalg.cholesky(precision))
+    return factor.T @ (factor @ (sd * products[:-1, -1])), factor
 
 
 def coefficients(problem: LinearProblem, parts: Sequence[Part]) -> list[slice]:
@@ -151,42 +195,43 @@ def sampled_curves(
     count: int,
     rng: np.random.Generator,
 ) -> DrawnCurves:
-    """Return posterior draws of the parts of a hypothesis."""
-    levels = [*product(*(part.levels for part in parts))]
-    chance = np.array([np.prod([share for share, _ in each]) for each in levels])
-    chance = chance / chance.sum()
-    drawn = []
-    for each, size in zip(levels, rng.multinomial(count, chance), strict=True):
-        if size:
-            loose = [
-                part._replace(loose=columns)
-                for part, (_, columns) in zip(parts, each, strict=True)
-            ]
-            drawn.append(_drawn(problem, noise, loose, size, rng))
-    return DrawnCurves(
-        *(np.concatenate(some, axis=1) for some in zip(*drawn, strict=True))
-    )
+    """Return posterior draws of the parts of a hypothesis, over all their levels."""
+    draws = _draws(problem, noise, parts, count, rng)
+    whole, own = [], []
+    for part, place in zip(parts, coefficients(problem, parts), strict=True):
+        values, size = draws[:, place], len(part.columns)
+        if part.one_sided:
+            values[:, 0] = np.maximum(values[:, 0], -part.mean[0])
+        curves = problem.project(part.unit.columns)
+        start = problem.project(part.unit.offset)
+        own.append(start + values[:, :size] @ curves[:size])
+        whole.append(own[-1] + values[:, size:] @ curves[size:])
+    return DrawnCurves(np.stack(whole), np.stack(own))
 
 
-def _drawn(
+def _draws(
     problem: LinearProblem,
     noise: NoiseModel,
     parts: Sequence[Part],
     count: int,
     rng: np.random.Generator,
-) -> DrawnCurves:
-    found, whole, own = posterior(problem, noise, parts), [], []
-    normal = rng.standard_normal((count, len(found.mean)))
-    draws = found.mean + normal @ found.factor
-    for part, place in zip(parts, coefficients(problem, parts), strict=True):
-        values = draws[:, place]
-        if part.one_sided:
-            values[:, 0] = np.maximum(values[:, 0], part.least)
-        offset, columns = (problem.project(each) for each in part.context())
-        size = len(part.columns)
-        own.append(offset + values[:, :size] @ columns[:size])
-        whole.append(own[-1] + values[:, size:] @ columns[size:])
-    return DrawnCurves(np.stack(whole), np.stack(own))
+) -> Float[np.ndarray, "d p"]:
+    """Return posterior draws of all coefficients, for columns of unit size."""
+    offsets, columns = zip(*(part.unit for part in parts), strict=True)
+    error = problem.y - np.sum(offsets, axis=0)
+    products = _products(problem, noise, error, np.concatenate([problem.X.T, *columns]))
+    base, drawn = np.ones(problem.X.shape[1]), []
+    levels = [*product(*(part.levels for part in parts))]
+    chance = np.array([np.prod([each.probability for each in some]) for some in levels])
+    counts = rng.multinomial(count, chance / chance.sum())
+    for some, size in zip(levels, counts, strict=True):
+        if size:
+            sds = [part.sds(level) for part, level in zip(parts, some, strict=True)]
+            sd = np.concatenate([base, *sds])
+            mean, factor = _solved(products, sd)
+            normal = rng.standard_normal((size, len(sd)))
+            drawn.append(sd * (mean + normal @ factor))
+    return np.concatenate(drawn)
 
 
 def mean_curves(

@@ -36,7 +36,7 @@ _SAME, _SPANNED = 0.97, 0.9
 # Length of the Matérn-½ process as a share of a half cycle.
 _LENGTH = 0.5
 # Shortest stretch as a share of all rows; most periods, by rows and by the clock.
-_FINEST, _MOST_PERIODS, _MOST_BY_TIME = 1.0 / 32.0, 96, 384
+_FINEST, _MOST_PERIODS, _MOST_BY_TIME = 1.0 / 64.0, 96, 384
 # Rows are uneven in time where the longest step is so many median ones; pauses count
 # as at most so many.
 _UNEVEN, _LONGEST_PAUSE = 1.5, 30.0

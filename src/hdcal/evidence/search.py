@@ -2,7 +2,7 @@
 
 Everything is evaluated alone under every model of the noise. Then the most probable
 components become contexts, one after the other, given which everything is evaluated
-again; the best pairs are refined, and evaluated with a remainder.
+again; the best pairs are evaluated with a remainder.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,6 @@ from hdcal.evidence.parts import Part, join, log_sign_probability, merged, poste
 from hdcal.evidence.remainder import kernels, likeliest_members, local_families
 from hdcal.evidence.row_features import (
     coarse_step,
-    half_cycle_rows,
     thin_rows,
     with_coarse_step,
 )
@@ -34,10 +33,8 @@ from hdcal.physics.effect import Effect
 _CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
 # Log evidence below the best given a context from which on a hypothesis is left out.
 _HOPELESS = 25.0
-# Pairs that are refined, times, and evaluated with a remainder.
-_REFINED, _TIMES = 3, 2
-# Difference of correlations that are the same.
-_SAME_CORRELATION = 0.01
+# Pairs that are evaluated with a remainder.
+_BEST = 3
 # Most kernels of a remainder, and prior odds of one more.
 _MOST_KERNELS, _ONE_MORE = 4, 0.25
 # Kernels and local families that share the prior of the remainder, at least.
@@ -46,9 +43,6 @@ _LEAST_SHARING = 15
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 # Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
 _MOST_ROWS = 10_000
-# Of oversampled rows one in three is kept, while so many are left, in all and of a half
-# cycle.
-_STEP, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
 
 
 def search(
@@ -61,32 +55,19 @@ def search(
     Raises:
         InputError: an effect has no prior.
     """
-    case = with_coarse_step(case)
-    step = -(-len(case.records.force) // _MOST_ROWS)
-    case = thin_rows(case, step) if step > 1 else case
+    case = thin_rows(with_coarse_step(case), _MOST_ROWS)
     problem = linear_problem(case, library, free_runs=free_runs)
     found = Searched(problem, library)
-    if _oversampled(problem, found.table):
-        return search(thin_rows(case, _STEP), library, free_runs=free_runs)
     about = _expansion(problem, found.table)
     if about is not None:
         problem = linear_problem(case, library, free_runs=free_runs, **about)
         found = Searched(problem, library, found.kernels)
-    found.fitted_correlations()
     found.coarse_step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
     if not found.coarse_step:
         found.other_noises()
     found.pairs()
     return found
-
-
-def _oversampled(problem: LinearProblem, table: EvidenceTable) -> bool:
-    """Whether noise is correlated as far as the grid reaches, in many rows."""
-    if int(np.argmax(table.noise_probabilities())) < len(table.noises) - 1:
-        return False
-    enough = len(problem.y) >= _STEP * _FEWEST
-    return enough and half_cycle_rows(problem.records) >= _STEP * _FEWEST_OF_HALF
 
 
 def _expansion(problem: LinearProblem, table: EvidenceTable) -> dict | None:
@@ -182,23 +163,6 @@ class Searched:
                     part = partial(found.likeliest, k)
                     table.put((table.names[k],), column, value, lambda p=part: [p()])
 
-    def fitted_correlations(self) -> None:
-        """Enter everything alone with the correlations that two hypotheses leave.
-
-        In many rows a correlation between two of the grid fits much better than both.
-        """
-        table, problem = self.table, self.problem
-        largest = table.noises[-1].correlation
-        for key in dict.fromkeys([(), table.ranked()[0]]):
-            fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            more = noise_models.correlated_noise(
-                problem, problem.y - fit.reading, largest
-            )
-            known = np.array([noise.correlation for noise in table.noises])
-            if np.min(np.abs(known - more.correlation)) > _SAME_CORRELATION:
-                table.add_noises([more])
-                self._alone([len(table.noises) - 1])
-
     def other_noises(self) -> None:
         """Enter everything alone under the library's models of the noise."""
         table, problem = self.table, self.problem
@@ -234,14 +198,11 @@ class Searched:
             self._grow((OUTSIDE,), columns)
         for key in leading:
             self._extend(table.parts[key], columns)
-        for _ in range(_TIMES):
-            for key in table.ranked(2)[:_REFINED]:
-                self._refine(key, columns[:1])
-        for key in table.ranked(2)[:_REFINED]:
+        for key in table.ranked(2)[:_BEST]:
             if OUTSIDE not in key:
                 self._extend(table.parts[key], columns, {self.outside})
         extended = [k for k in table.ranked() if OUTSIDE in k and len(k) > 1]
-        for key in extended[:_REFINED]:
+        for key in extended[:_BEST]:
             self._grow(key, columns[:1])
 
     def _grow(self, key: Names, columns: Sequence[int]) -> None:
@@ -259,13 +220,6 @@ class Searched:
                 table.put(key, column, value, lambda more=more: more)
             if table.log_evidence[key].max() <= before:
                 return
-
-    def _refine(self, key: Names, columns: Sequence[int]) -> None:
-        """Evaluate each member of a pair given the best item of the other one."""
-        members = {self.table.names.index(name) for name in key}
-        for part in [*self.table.parts[key]]:
-            if part.component != self.outside:
-                self._extend([part], columns, members - {part.component})
 
     def _extend(
         self, parts: list[Part], columns: Sequence[int], only: set[int] | None = None
