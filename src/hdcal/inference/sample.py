@@ -5,6 +5,7 @@ advances in short stretches, for progress to be shown and interruptions to take 
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -135,10 +136,9 @@ class _Run:
             # Stretches end with the warm-up, for few lengths.
             left = (warmup if self._done < warmup else total) - self._done
             size = {"warmup": warmup, "length": min(_STRETCH, left)}
-            moved = [
-                _advance(*self._arguments, state, self._target, **size)
-                for state in self._states
-            ]
+            advance = partial(_advance, *self._arguments, target=self._target, **size)
+            with ThreadPoolExecutor() as pool:
+                moved = [*pool.map(advance, self._states)]
             self._states = [state for state, _ in moved]
             kept = jax.device_get([kept for _, kept in moved])
             if self._done >= warmup:
@@ -188,7 +188,7 @@ def _start(problem, whitening, seed, chain, target, *, warmup, chains):
 
 
 @jax.jit(static_argnames=("warmup", "length"))
-def _advance(problem, whitening, leaves, target, *, warmup, length):
+def _advance(problem, whitening, leaves, *, target, warmup, length):
     """Return the state of a chain after so many steps, and what is kept of each."""
     start, step = _kernel(problem, whitening, warmup, target)
     # The step function takes its settings from the last call of its init.
