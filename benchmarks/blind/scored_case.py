@@ -1,8 +1,11 @@
 """One case: its label and an answer to it."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from benchmarks.blind.label import NONE, OUTSIDE, Answer, Cause, Label
 
@@ -55,6 +58,26 @@ class ScoredCase:
         best = max(chances.values(), default=0.0)
         first = [n for n, p in chances.items() if p == best and p > 0.0]
         return 1.0 / len(first) if self.label.truth[0] in first else 0.0
+
+    @property
+    def class_first(self) -> bool:
+        """Whether the likeliest class contains the true effect."""
+        best = max(
+            self.answer.classes, key=lambda each: each.acts, default=Cause((), 0.0)
+        )
+        return self.holds_truth(best)
+
+    @property
+    def merged_set(self) -> int:
+        """Number of explanations with 90 %, where effects of a class are one."""
+        first = {
+            n: each.members[0] for each in self.answer.classes for n in each.members
+        }
+        chances: Counter[frozenset[str]] = Counter()
+        for name, chance in self.answer.explanations.items():
+            chances[frozenset(first.get(n, n) for n in name.split("+"))] += chance
+        total = np.cumsum([chance for _, chance in chances.most_common()])
+        return int(np.searchsorted(total, STATED)) + 1
 
     def holds_truth(self, cause: Cause) -> bool:
         """Return whether an effect of a class acts."""

@@ -93,6 +93,8 @@ def _causes(cases: Cases) -> Iterator[Row]:
         first = share(c.credit for c in rich)
         yield Row(words, first, at_least(target), within=True)
     large = [c for c in known if c.at_least(1.0)]
+    first = share(c.class_first for c in large)
+    yield Row("likeliest class contains the true effect, r ≥ 1", first)
     stated = share(c.truth_stated for c in large)
     yield Row("true effect or its class stated at 90 %, r ≥ 1", stated, at_least(0.8))
     for level, target in ((STATED, 0.9), (_SURE, 0.98)):
@@ -119,6 +121,8 @@ def _probabilities(cases: Cases) -> Iterator[Row]:
     size = mean([len(c.answer.set) for c in known if c.at(1.0)])
     words = "explanations in the 90 % set, r = 1"
     yield Row(words, size, at_most(1.5), "count")
+    size = mean([c.merged_set for c in known if c.at(1.0)])
+    yield Row("… effects of a class counted once", size, None, "count")
     yield Row("log score of the true explanation", log_score(cases), None, "nat")
 
 

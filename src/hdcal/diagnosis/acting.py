@@ -16,8 +16,11 @@ from hdcal.evidence.parts import mean_curves, sampled_curves
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
 
-# A component acts from this squared visible length on, in noise variances.
+# A component acts from this squared length on, in whitened rows and noise variances.
 _SHOWN = 6.0
+# Cosine of its angle to the gap below which it closes less than half a per cent of the
+# gap's rms: rounded, nothing.
+_ALONG = 0.1
 # No draws are made of less probable hypotheses: all that they contain acts.
 NEGLIGIBLE, DRAWS = 3e-3, 200
 # Effects that close less of the gap than this leave it outside the library.
@@ -162,10 +165,14 @@ def _drawn(
     # Structure within the rounding of a coarse reading shows nothing.
     largest = float(np.max(np.abs(problem.records.force)))
     least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
-    visible = np.sum((noise.weight * curves) ** 2, axis=2)
+    white = problem.whiten(curves, noise.weight, noise.correlation)
+    visible = np.sum(white**2, axis=2)
     shown = visible > _SHOWN * problem.noise_sd**2
     shown &= np.mean(curves**2, axis=2) > least**2
     gaps = np.sum(curves, axis=0)
+    along = np.einsum("kdn,dn->kd", curves, gaps)
+    lengths = np.linalg.norm(curves, axis=2) * np.linalg.norm(gaps, axis=1)
+    shown &= along > _ALONG * lengths
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)
         acts = [k for k, on in enumerate(pattern) if on]
