@@ -13,6 +13,7 @@ from hdcal.evidence.linear_problem import LinearProblem, linear_problem
 from hdcal.evidence.noise_models import (
     PRIOR_ODDS,
     NoiseModel,
+    correlated_noise,
     growing_noise,
     outliers,
 )
@@ -64,6 +65,18 @@ def test_outliers_are_a_bound_of_the_sum_over_all_assignments(wild: float):
     assert exact - 4.0 < bound < exact + 0.02
     equal = evidence(problem, NoiseModel("", np.ones(ROWS), 0.0, 0.0))
     assert (bound > equal) == (wild != 0.0)
+
+
+def test_a_correlation_is_that_of_the_errors():
+    rng, error = np.random.default_rng(2), np.zeros(4000)
+    for row in range(1, len(error)):
+        error[row] = 0.7 * error[row - 1] + rng.normal(0.0, NOISE)
+    problem = problem_of(error)
+    (model,) = correlated_noise(problem, error, (0.6, 0.98))
+    assert not correlated_noise(problem, error, (0.7, 0.98))
+    assert model.correlation == pytest.approx(0.7, abs=0.04)
+    sd = np.sqrt((1.0 - 0.7**2) / len(error))
+    assert np.exp(model.log_prior) == pytest.approx(np.sqrt(2.0 * np.pi) * sd, rel=0.1)
 
 
 def test_noise_that_grows_has_its_variance_and_at_most_its_prior():

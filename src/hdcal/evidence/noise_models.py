@@ -1,6 +1,6 @@
 """Models of the noise: equal in all rows, growing with the force, or with outliers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +62,27 @@ def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
         correlations += [middle, longest]
     log_prior = -float(np.log(len(correlations)))
     return [NoiseModel("", problem.weight, float(c), log_prior) for c in correlations]
+
+
+def correlated_noise(
+    problem: LinearProblem, error: Float[np.ndarray, " n"], known: Sequence[float]
+) -> list[NoiseModel]:
+    """Return equal noise with the correlation that errors [N] have, up to known ones.
+
+    There is none within two sds of a known one: that stands for it. Its prior is the
+    mass of a normal around it: uniform over the correlation times the width of its
+    likelihood.
+    """
+    follows = problem.before >= 0
+    error = error * problem.weight
+    last = error[problem.before[follows]]
+    found = float(error[follows] @ last / max(last @ last, 1e-300))
+    found = float(np.clip(found, 0.0, max(known)))
+    sd = np.sqrt((1.0 - found**2) / max(np.count_nonzero(follows), 1))
+    if np.min(np.abs(np.subtract(known, found))) < 2.0 * sd:
+        return []
+    log_mass = float(np.log(min(np.sqrt(2.0 * np.pi) * sd, 1.0)))
+    return [NoiseModel("", problem.weight, found, log_mass)]
 
 
 def growing_noise(problem: LinearProblem, correlation: float) -> list[NoiseModel]:

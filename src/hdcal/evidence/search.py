@@ -62,6 +62,7 @@ def search(
     if about is not None:
         problem = linear_problem(case, library, free_runs=free_runs, **about)
         found = Searched(problem, library, found.kernels)
+    found.fitted_correlations()
     found.coarse_step = coarse_step(case, problem.noise_sd)
     # The noise of a coarse reading is not normal; no effect need explain that.
     if not found.coarse_step:
@@ -162,6 +163,21 @@ class Searched:
                 if np.isfinite(value):
                     part = partial(found.likeliest, k)
                     table.put((table.names[k],), column, value, lambda p=part: [p()])
+
+    def fitted_correlations(self) -> None:
+        """Enter everything alone with the correlations that two hypotheses leave.
+
+        In many rows one between two of the grid fits much better than both.
+        """
+        table, problem = self.table, self.problem
+        for key in dict.fromkeys([(), table.ranked()[0]]):
+            fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
+            known = [noise.correlation for noise in table.noises]
+            error = problem.y - fit.reading
+            more = noise_models.correlated_noise(problem, error, known)
+            count = len(table.noises)
+            table.add_noises(more)
+            self._alone(range(count, len(table.noises)))
 
     def other_noises(self) -> None:
         """Enter everything alone under the library's models of the noise."""
