@@ -11,8 +11,8 @@ from benchmarks.blind.label import NONE, OUTSIDE, Answer, Cause, Label
 
 # Least probability in a log score: no case may weigh more than log 1e-6 = −13.8.
 FLOOR = 1e-6
-# Probability from which on a class is stated to act.
-STATED = 0.9
+# Probability from which on a class is stated to act, and that of a credible set.
+STATED, CREDIBLE = 0.9, 0.9
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class ScoredCase:
         for name, chance in self.answer.explanations.items():
             chances[frozenset(first.get(n, n) for n in name.split("+"))] += chance
         total = np.cumsum([chance for _, chance in chances.most_common()])
-        return int(np.searchsorted(total, STATED)) + 1
+        return int(np.searchsorted(total, CREDIBLE)) + 1
 
     def holds_truth(self, cause: Cause) -> bool:
         """Return whether an effect of a class acts."""

@@ -9,9 +9,11 @@ from rigs import make_records
 
 from hdcal.data.case import Case
 from hdcal.diagnosis import decision
-from hdcal.diagnosis.acting import Acting
+from hdcal.diagnosis.acting import Acting, acts_in
 from hdcal.diagnosis.decision import Decision
 from hdcal.diagnosis.which import Cause
+from hdcal.evidence.linear_problem import linear_problem
+from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.search import search
 from hdcal.physics.registry import EFFECTS
 
@@ -119,6 +121,27 @@ def test_a_ramp_has_no_loop():
     force[:3] -= 4.0
     found = judged(with_force(case, force))
     assert not [seen for seen in found.seen if seen.covariate == "direction"]
+
+
+@pytest.mark.parametrize(
+    ("correlation", "beside", "acts"),
+    [(0.0, 0.0, True), (0.9, 0.0, False), (0.0, 5.0, True), (0.0, 30.0, False)],
+)
+def test_a_component_acts_where_rows_show_it_and_it_closes_something(
+    correlation: float, beside: float, acts: bool
+):
+    """Correlated noise hides slow curves; of a large gap a small one closes nothing."""
+    case = simulated(rich(), seed=1)
+    problem = linear_problem(case, {}, noise_sd=0.5)
+    rows = np.linspace(0.0, 1.0, len(problem.y))
+    slow, fast = np.sin(2.0 * np.pi * rows), np.sin(40.0 * np.pi * rows)
+    # Its squared length is 30 noise variances.
+    slow *= 0.5 * np.sqrt(30.0) / np.linalg.norm(slow)
+    fast *= beside * np.linalg.norm(slow) / np.linalg.norm(fast)
+    noise = NoiseModel("", np.ones(len(rows)), correlation, 0.0)
+    curves = np.stack([slow, fast])[:, None]
+    found = acts_in(problem, noise, curves, least=1e-3)
+    assert found[:, 0].tolist() == [acts, beside > 0.0]
 
 
 def test_a_withheld_effect_is_outside():

@@ -24,10 +24,14 @@ from hdcal.physics.registry import EFFECTS
 ROWS, NOISE = 9, 0.4
 
 
-def problem_of(error: np.ndarray) -> LinearProblem:
+def problem_of(error: np.ndarray, order: np.ndarray | None = None) -> LinearProblem:
+    """Return a loaded spring with errors, its deformations in some order."""
     records = ramp(len(error))
     case = make_case(records, make_gear())
-    force = 195.0 * np.asarray(records.deformation) + 1.0 + error
+    if order is not None:
+        deformation = np.asarray(records.deformation)[order]
+        object.__setattr__(case.records, "deformation", deformation)
+    force = 195.0 * np.asarray(case.records.deformation) + 1.0 + error
     object.__setattr__(case.records, "force", force)
     return linear_problem(case, EFFECTS, noise_sd=NOISE)
 
@@ -65,6 +69,29 @@ def test_outliers_are_a_bound_of_the_sum_over_all_assignments(wild: float):
     assert exact - 4.0 < bound < exact + 0.02
     equal = evidence(problem, NoiseModel("", np.ones(ROWS), 0.0, 0.0))
     assert (bound > equal) == (wild != 0.0)
+
+
+@pytest.mark.parametrize(
+    ("shuffled", "place", "found"),
+    [
+        (True, "beside each other in time", False),
+        (True, "beside each other in the deformation", False),
+        (False, "at random", True),
+    ],
+)
+def test_outliers_are_no_neighbours(shuffled: bool, place: str, found: bool):
+    rows, rng = 80, np.random.default_rng(4)
+    order = rng.permutation(rows) if shuffled else np.arange(rows)
+    wild = {"time": np.arange(30, 38), "deformation": np.flatnonzero(order // 8 == 3)}
+    some = wild.get(place.split()[-1], rng.choice(rows, 8, replace=False))
+    error = rng.normal(0.0, NOISE, rows)
+    error[some] += 8.0 * rng.choice([-1.0, 1.0], len(some))
+    problem = problem_of(error, order)
+
+    def fitted(weight):
+        return posterior(problem, NoiseModel("", weight, 0.0, 0.0), []).reading
+
+    assert bool(outliers(problem, 0.0, fitted)) == found
 
 
 def test_a_correlation_is_that_of_the_errors():

@@ -9,9 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from hdcal.diagnosis.which import MATTERS
+from hdcal.evidence.linear_problem import LinearProblem
+from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.parts import mean_curves, sampled_curves
 from hdcal.evidence.search import Searched
 from hdcal.evidence.table import OUTSIDE, Names
@@ -165,14 +167,8 @@ def _drawn(
     # Structure within the rounding of a coarse reading shows nothing.
     largest = float(np.max(np.abs(problem.records.force)))
     least = max(MATTERS * largest, searched.coarse_step / np.sqrt(12.0))
-    white = problem.whiten(curves, noise.weight, noise.correlation)
-    visible = np.sum(white**2, axis=2)
-    shown = visible > _SHOWN * problem.noise_sd**2
-    shown &= np.mean(curves**2, axis=2) > least**2
+    shown = acts_in(problem, noise, curves, least)
     gaps = np.sum(curves, axis=0)
-    along = np.einsum("kdn,dn->kd", curves, gaps)
-    lengths = np.linalg.norm(curves, axis=2) * np.linalg.norm(gaps, axis=1)
-    shown &= along > _ALONG * lengths
     for pattern in np.unique(shown.T, axis=0):
         these = np.all(pattern == shown.T, axis=1)
         acts = [k for k, on in enumerate(pattern) if on]
@@ -190,6 +186,25 @@ def _drawn(
             carried=share_closed(gap, effects),
             rms=np.sqrt(np.mean(gap**2, axis=1)),
         )
+
+
+def acts_in(
+    problem: LinearProblem,
+    noise: NoiseModel,
+    curves: Float[np.ndarray, "k d n"],
+    least: float,
+) -> Bool[np.ndarray, "k d"]:
+    """Return in which draws each component acts: shows, matters and closes something.
+
+    It matters from an rms of `least` on [N].
+    """
+    white = problem.whiten(curves, noise.weight, noise.correlation)
+    gaps = np.sum(curves, axis=0)
+    along = np.einsum("kdn,dn->kd", curves, gaps)
+    lengths = np.linalg.norm(curves, axis=2) * np.linalg.norm(gaps, axis=1)
+    shows = np.sum(white**2, axis=2) > _SHOWN * problem.noise_sd**2
+    matters = np.mean(curves**2, axis=2) > least**2
+    return shows & matters & (along > _ALONG * lengths)
 
 
 def share_closed(

@@ -12,7 +12,7 @@ from hdcal.evidence.items import MOST_COLUMNS, STEPS, Amplitudes, Atoms, Space
 from hdcal.evidence.linear_problem import LinearProblem
 from hdcal.evidence.marginal import Marginal
 from hdcal.evidence.noise_models import NoiseModel
-from hdcal.evidence.parts import Context, Level, Part
+from hdcal.evidence.parts import CoefficientPrior, Context, Part
 from hdcal.evidence.projection import Block, Projection
 
 # Relative sds by which a shape may deviate from the library's, and their probabilities.
@@ -168,8 +168,8 @@ class Evaluated:
             columns=atom.slope,
             mean=size,
             loose=selection.tolerance[row],
-            levels=tuple(
-                Level(float(chances[k]), sd, float(_TOLERANCES[k]))
+            priors=tuple(
+                CoefficientPrior(float(chances[k]), sd, float(_TOLERANCES[k]))
                 for k in np.argsort(-chances)
             ),
             one_sided=bool(least >= 0.0),
@@ -196,8 +196,9 @@ def _space_part(
         columns=space.columns,
         mean=np.zeros(count),
         loose=np.zeros((0, rows)),
-        levels=tuple(
-            Level(float(chances[k]), np.full(count, space.scale[k])) for k in ranked
+        priors=tuple(
+            CoefficientPrior(float(chances[k]), np.full(count, space.scale[k]))
+            for k in ranked
         ),
         shape=space.shape,
         place=place,

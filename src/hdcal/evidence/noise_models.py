@@ -142,10 +142,10 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    There is none where wild rows are neighbours: that is structure. With
-    any probabilities that rows are wild the evidence of every hypothesis is a lower
-    bound, tight where rows are clearly wild or not; these come from an EM fit. `fitted`
-    maps weights of rows to the mean reading given some hypothesis.
+    There is none where wild rows are neighbours: that is structure. With any
+    probabilities that rows are wild the evidence of every hypothesis is a lower bound,
+    tight where rows are clearly wild or not; these come from an EM fit. `fitted` maps
+    weights of rows to the mean reading given some hypothesis.
     """
     ratios = quantiles(problem.priors[f"{OUTLIERS}.ratio"], _RATIOS)
     best = max(

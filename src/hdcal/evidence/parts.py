@@ -19,8 +19,8 @@ class Context(NamedTuple):
     columns: Float[np.ndarray, "c n"]
 
 
-class Level(NamedTuple):
-    """Sizes that the coefficients of a part may have, with their probability.
+class CoefficientPrior(NamedTuple):
+    """A prior of the coefficients of a part, with its posterior probability.
 
     `sd` is that of a; `tolerance` is the relative sd of the deviation of the shape.
     """
@@ -36,7 +36,7 @@ class Part(NamedTuple):
     Attributes:
         mean: of a, as the item alone has it.
         loose: columns of the shape's tolerance at a relative sd of 1 [N].
-        levels: what its coefficients may be, the most probable first.
+        priors: of its coefficients, the most probable first.
         one_sided: whether a is not negative.
         shape: index of the point of the shape parameters; −1 without one.
         chord: two amplitudes between which one column is exact.
@@ -49,7 +49,7 @@ class Part(NamedTuple):
     columns: Float[np.ndarray, "j n"]
     mean: Float[np.ndarray, " j"]
     loose: Float[np.ndarray, "l n"]
-    levels: tuple[Level, ...]
+    priors: tuple[CoefficientPrior, ...]
     shape: int
     place: tuple[int, int] | None
     spread: float
@@ -58,8 +58,8 @@ class Part(NamedTuple):
 
     @property
     def sd(self) -> Float[np.ndarray, " j"]:
-        """Prior sd of a at the most probable level."""
-        return self.levels[0].sd
+        """Sd of a under the most probable prior."""
+        return self.priors[0].sd
 
     @property
     def width(self) -> int:
@@ -71,9 +71,9 @@ class Part(NamedTuple):
         """The coefficient of the first column at which a is zero."""
         return -float(self.mean[0] / self.sd[0])
 
-    def sds(self, level: Level) -> Float[np.ndarray, " w"]:
+    def sds(self, prior: CoefficientPrior) -> Float[np.ndarray, " w"]:
         """Return the prior sds of the coefficients of all columns."""
-        return np.append(level.sd, np.full(len(self.loose), level.tolerance))
+        return np.append(prior.sd, np.full(len(self.loose), prior.tolerance))
 
     @property
     def unit(self) -> Context:
@@ -82,9 +82,9 @@ class Part(NamedTuple):
         return Context(self.offset + self.mean @ self.columns, columns)
 
     def context(self) -> Context:
-        """Return the part at its most probable level as one of the base."""
+        """Return the part under its most probable prior as one of the base."""
         offset, columns = self.unit
-        return Context(offset, self.sds(self.levels[0])[:, None] * columns)
+        return Context(offset, self.sds(self.priors[0])[:, None] * columns)
 
 
 def merged(parts: Sequence[Part]) -> Part:
@@ -93,8 +93,8 @@ def merged(parts: Sequence[Part]) -> Part:
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("columns", "mean", "sd")
     )
-    levels = (Level(1.0, sd),)
-    return parts[0]._replace(columns=columns, mean=mean, levels=levels, place=None)
+    priors = (CoefficientPrior(1.0, sd),)
+    return parts[0]._replace(columns=columns, mean=mean, priors=priors, place=None)
 
 
 class DrawnCurves(NamedTuple):
@@ -195,7 +195,7 @@ def sampled_curves(
     count: int,
     rng: np.random.Generator,
 ) -> DrawnCurves:
-    """Return posterior draws of the parts of a hypothesis, over all their levels."""
+    """Return posterior draws of the parts of a hypothesis, over all their priors."""
     draws = _draws(problem, noise, parts, count, rng)
     whole, own = [], []
     for part, place in zip(parts, coefficients(problem, parts), strict=True):
@@ -221,12 +221,12 @@ def _draws(
     error = problem.y - np.sum(offsets, axis=0)
     products = _products(problem, noise, error, np.concatenate([problem.X.T, *columns]))
     base, drawn = np.ones(problem.X.shape[1]), []
-    levels = [*product(*(part.levels for part in parts))]
-    chance = np.array([np.prod([each.probability for each in some]) for some in levels])
+    priors = [*product(*(part.priors for part in parts))]
+    chance = np.array([np.prod([each.probability for each in some]) for some in priors])
     counts = rng.multinomial(count, chance / chance.sum())
-    for some, size in zip(levels, counts, strict=True):
+    for some, size in zip(priors, counts, strict=True):
         if size:
-            sds = [part.sds(level) for part, level in zip(parts, some, strict=True)]
+            sds = [part.sds(prior) for part, prior in zip(parts, some, strict=True)]
             sd = np.concatenate([base, *sds])
             mean, factor = _solved(products, sd)
             normal = rng.standard_normal((size, len(sd)))

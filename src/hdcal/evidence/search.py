@@ -167,17 +167,14 @@ class Searched:
     def fitted_correlations(self) -> None:
         """Enter everything alone with the correlations that two hypotheses leave.
 
-        In many rows one between two of the grid fits much better than both.
+        Where rows are many, one between two of the grid fits much better than either.
         """
         table, problem = self.table, self.problem
         for key in dict.fromkeys([(), table.ranked()[0]]):
             fit = posterior(problem, table.likeliest_noise(key), table.parts[key])
             known = [noise.correlation for noise in table.noises]
             error = problem.y - fit.reading
-            more = noise_models.correlated_noise(problem, error, known)
-            count = len(table.noises)
-            table.add_noises(more)
-            self._alone(range(count, len(table.noises)))
+            self._add_noises(noise_models.correlated_noise(problem, error, known))
 
     def other_noises(self) -> None:
         """Enter everything alone under the library's models of the noise."""
@@ -198,9 +195,14 @@ class Searched:
                     return posterior(problem, equal, parts).reading
 
                 more += noise_models.outliers(problem, correlation, fitted)
-        count = len(table.noises)
-        table.add_noises(more)
-        self._alone(range(count, len(table.noises)))
+        self._add_noises(more)
+
+    def _add_noises(self, more: list[NoiseModel]) -> None:
+        """Enter everything alone under more models of the noise."""
+        if more:
+            count = len(self.table.noises)
+            self.table.add_noises(more)
+            self._alone(range(count, count + len(more)))
 
     def pairs(self) -> None:
         """Enter pairs, and components and pairs with a remainder."""
