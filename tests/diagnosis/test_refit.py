@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from posteriors import beside, single
-from rigs import cycles, make_case
+from rigs import cycles, make_case, make_records
 
 from hdcal.diagnosis.diagnose import _stiffness
 from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate, weighed
@@ -129,6 +129,10 @@ def test_long_logs_are_calibrated_on_single_rows_that_hold_the_turns():
     assert set(np.asarray(few.records.force)) <= set(np.asarray(long.records.force))
     assert np.max(few.records.deformation) == np.max(long.records.deformation)
     assert len(few.notes) == len(long.notes) + 1
+    # Turns of more half cycles than rows that are kept would not be few.
+    ways = np.tile([1.0, -1.0], 6_000)
+    restless = make_case(make_records(0.2 + 0.1 * ways, sense=ways))
+    assert len(rows_to_calibrate(restless).records.force) <= 1_000
     short = make_case(cycles(102))
     assert rows_to_calibrate(short) is short
 

@@ -71,8 +71,8 @@ def test_wild_readings_are_outliers_with_or_without_structure(effects: dict):
 
 
 @pytest.mark.parametrize("where", ["stretch", "burst", "place"])
-def test_wild_readings_beside_each_other_are_structure(where: str):
-    """Beside each other in time, of either sign, or in the deformation."""
+def test_wild_readings_that_agree_with_neighbours_are_structure(where: str):
+    """On one side, neighbours in time or in the deformation; a burst is noise."""
     case = simulated(rich(), seed=5)
     force, records = np.array(case.records.force), case.records
     place, loading = np.asarray(records.deformation), np.asarray(records.sense) > 0
@@ -83,10 +83,13 @@ def test_wild_readings_beside_each_other_are_structure(where: str):
     else:
         force[loading & (np.abs(place - 0.3) < 0.02)] += 4.0
     found = decide(with_force(case, force))
-    assert found.which.inclusion["outliers"] < 0.1
-    # What changes its sign from reading to reading is no smooth structure.
-    if where != "burst":
-        assert found.gap > 0.99 and found.which.outside.probability > 0.9
+    inclusion, outside = found.which.inclusion, found.which.outside.probability
+    assert found.gap > 0.99
+    if where == "burst":
+        assert inclusion["outliers"] > 0.9 and outside < 0.1
+        assert inclusion["heteroscedastic_noise"] < 0.1
+    else:
+        assert inclusion["outliers"] < 0.1 and outside > 0.9
 
 
 @pytest.mark.parametrize(

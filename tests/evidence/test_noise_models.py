@@ -72,20 +72,27 @@ def test_outliers_are_a_bound_of_the_sum_over_all_assignments(wild: float):
 
 
 @pytest.mark.parametrize(
-    ("shuffled", "place", "found"),
+    ("place", "sides", "found"),
     [
-        (True, "beside each other in time", False),
-        (True, "beside each other in the deformation", False),
-        (False, "at random", True),
+        ("time", [1.0], False),
+        ("deformation", [1.0], False),
+        # As in a burst of noise.
+        ("time", [1.0, -1.0], True),
+        ("random", [1.0], True),
+        ("pair", [1.0], True),
     ],
 )
-def test_outliers_are_no_neighbours(shuffled: bool, place: str, found: bool):
-    rows, rng = 80, np.random.default_rng(4)
-    order = rng.permutation(rows) if shuffled else np.arange(rows)
-    wild = {"time": np.arange(30, 38), "deformation": np.flatnonzero(order // 8 == 3)}
-    some = wild.get(place.split()[-1], rng.choice(rows, 8, replace=False))
+def test_outliers_do_not_agree_with_neighbours(place: str, sides: list, found: bool):
+    rows, rng = 480, np.random.default_rng(4)
+    order = rng.permutation(rows)
+    some = {
+        "time": np.arange(30, 38),
+        "deformation": np.flatnonzero(order // 8 == 3),
+        "random": rng.choice(rows, 8, replace=False),
+        "pair": np.array([200, 201]),
+    }[place]
     error = rng.normal(0.0, NOISE, rows)
-    error[some] += 8.0 * rng.choice([-1.0, 1.0], len(some))
+    error[some] += 8.0 * np.resize(sides, len(some))
     problem = problem_of(error, order)
 
     def fitted(weight):

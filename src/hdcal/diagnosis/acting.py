@@ -1,7 +1,8 @@
 """Classes of effects, and the components that act in draws of each hypothesis.
 
 The gap is the sum of the components, with the base model projected out. A component
-acts in a draw where the rows show it: a tiny coefficient does not act.
+acts in a draw where the rows show it, where it is not immaterial, and where it closes a
+part of the gap: a tiny coefficient does not act.
 """
 
 from collections import defaultdict
@@ -20,8 +21,8 @@ from hdcal.evidence.table import OUTSIDE, Names
 
 # A component acts from this squared length on, in whitened rows and noise variances.
 _SHOWN = 6.0
-# Cosine of its angle to the gap below which it closes less than half a per cent of the
-# gap's rms: rounded, nothing.
+# Cosine of the angle between a component and the gap below which the component closes
+# less than half a per cent of the gap's rms, which would be shown as 0 %.
 _ALONG = 0.1
 # No draws are made of less probable hypotheses: all that they contain acts.
 NEGLIGIBLE, DRAWS = 3e-3, 200
@@ -194,10 +195,7 @@ def acts_in(
     curves: Float[np.ndarray, "k d n"],
     least: float,
 ) -> Bool[np.ndarray, "k d"]:
-    """Return in which draws each component acts: shows, matters and closes something.
-
-    It matters from an rms of `least` on [N].
-    """
+    """Return in which draws each component acts; `least` is its least rms [N]."""
     white = problem.whiten(curves, noise.weight, noise.correlation)
     gaps = np.sum(curves, axis=0)
     along = np.einsum("kdn,dn->kd", curves, gaps)

@@ -34,8 +34,8 @@ _CREDIBLE, _DRAWS = 0.9, 300
 class Decision:
     """What a case shows about what its base model lacks.
 
-    `gap` is the probability that something acts, `gap_N` the rms of what acts on the
-    mean reading where it does, None where no draws were made. `hypotheses` are the
+    `gap` is the probability that something acts, `gap_N` the rms of the gap in the mean
+    reading where something acts, None where no draws were made. `hypotheses` are the
     components that act, on mean and noise, with their probabilities; `explanations` are
     all, likeliest first.
     """

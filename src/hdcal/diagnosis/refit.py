@@ -44,8 +44,8 @@ class Refits:
 
 
 def rows_to_calibrate(case: Case) -> Case:
-    """Return the case with at most about 1,000 rows, the turns among them."""
-    few = thin_rows(case, _MOST_ROWS)
+    """Return the case with about 1,000 rows at most, the turns among them."""
+    few = thin_rows(case, _MOST_ROWS, turns=True)
     if few is case:
         return case
     left, rows = len(few.records.force), len(case.records.force)

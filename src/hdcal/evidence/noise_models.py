@@ -32,7 +32,7 @@ _SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
-# Significance level from which on outliers are neighbours by more than chance.
+# Significance level of the test of runs of outliers.
 _CHANCE = 0.01
 
 
@@ -67,11 +67,11 @@ def equal_noise(problem: LinearProblem) -> list[NoiseModel]:
 def correlated_noise(
     problem: LinearProblem, error: Float[np.ndarray, " n"], known: Sequence[float]
 ) -> list[NoiseModel]:
-    """Return equal noise with the correlation that errors [N] have, up to known ones.
+    """Return equal noise with the correlation of errors [N], at most the largest known.
 
-    There is none within two sds of a known one: that stands for it. Its prior is the
-    mass of a normal around it: uniform over the correlation times the width of its
-    likelihood.
+    The list is empty where that correlation lies within two sds of a known one. The
+    prior is the mass of a normal around it: uniform over the correlation times the
+    width of its likelihood.
     """
     follows = problem.before >= 0
     error = error * problem.weight
@@ -142,10 +142,10 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    There is none where wild rows are neighbours: that is structure. With any
-    probabilities that rows are wild the evidence of every hypothesis is a lower bound,
-    tight where rows are clearly wild or not; these come from an EM fit. `fitted` maps
-    weights of rows to the mean reading given some hypothesis.
+    The list is empty where wild rows agree with their neighbours: that is structure.
+    With any probabilities that rows are wild the evidence of every hypothesis is a
+    lower bound, tight where rows are clearly wild or not; these come from an EM fit.
+    `fitted` maps weights of rows to the mean reading given some hypothesis.
     """
     ratios = quantiles(problem.priors[f"{OUTLIERS}.ratio"], _RATIOS)
     best = max(
@@ -193,17 +193,22 @@ def _beta_numbers(prior: Prior) -> tuple[float, float]:
 
 
 def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
-    """Whether wild rows are neighbours more often than rows at random places.
+    """Whether wild errors [N] agree with neighbours more often than by chance.
 
-    Neighbours in time, or in the deformation in one direction. The number of runs of
-    wild rows is hypergeometric (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940).
+    Neighbours in time, or in the deformation in one direction; rows that are not wild
+    have an error of 0. A disturbance may last for two readings. The number of runs of
+    disturbances at random places is hypergeometric (Wald and Wolfowitz, Ann. Math.
+    Stat. 11, 1940).
     """
     records, rows = problem.records, len(wild)
-    count = int(np.count_nonzero(wild))
+    disturbances = -(-int(np.count_nonzero(wild)) // 2)
+    if disturbances < 2:
+        return False
     place = np.lexsort([records.deformation, records.sense])
-    runs = [
-        np.count_nonzero(np.diff((wild[order] != 0.0).astype(int), prepend=0) == 1)
-        for order in (np.arange(rows), place)
-    ]
-    chance = hypergeom.cdf(runs, rows, rows - count + 1, count)
-    return bool(count and np.min(chance) < _CHANCE / len(runs))
+    runs = []
+    for order in (np.arange(rows), place):
+        side = np.sign(wild[order])
+        begins = np.diff(side, prepend=0.0) != 0.0
+        runs.append(np.count_nonzero(begins & (side != 0.0)))
+    chance = hypergeom.cdf(runs, rows, rows - disturbances + 1, disturbances)
+    return bool(np.min(chance) < _CHANCE / len(runs))

@@ -20,7 +20,7 @@ class Context(NamedTuple):
 
 
 class CoefficientPrior(NamedTuple):
-    """A prior of the coefficients of a part, with its posterior probability.
+    """A prior of the coefficients of a part, with its probability where it was found.
 
     `sd` is that of a; `tolerance` is the relative sd of the deviation of the shape.
     """
@@ -149,7 +149,7 @@ def _products(
     error: Float[np.ndarray, " n"],
     columns: Float[np.ndarray, "p n"],
 ) -> Float[np.ndarray, "q q"]:
-    """Return inner products of columns and, last, an error in whitened rows."""
+    """Return products of columns and, last, an error in whitened noise variances."""
     both = np.concatenate([columns, error[None]])
     white = problem.whiten(both, noise.weight, noise.correlation) / problem.noise_sd
     return white @ white.T
@@ -200,10 +200,11 @@ def sampled_curves(
     whole, own = [], []
     for part, place in zip(parts, coefficients(problem, parts), strict=True):
         values, size = draws[:, place], len(part.columns)
+        offset, columns = part.unit
         if part.one_sided:
             values[:, 0] = np.maximum(values[:, 0], -part.mean[0])
-        curves = problem.project(part.unit.columns)
-        start = problem.project(part.unit.offset)
+        curves = problem.project(columns)
+        start = problem.project(offset)
         own.append(start + values[:, :size] @ curves[:size])
         whole.append(own[-1] + values[:, size:] @ curves[size:])
     return DrawnCurves(np.stack(whole), np.stack(own))

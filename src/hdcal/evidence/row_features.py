@@ -76,22 +76,24 @@ def tolerance_functions(records: Records) -> Float[np.ndarray, "j n"]:
     return table / np.sqrt(np.sum(np.mean(table**2, axis=1)))
 
 
-def thin_rows(case: Case, most: int) -> Case:
-    """Return the case with at most about so many rows, the turns of the path too.
+def thin_rows(case: Case, most: int, *, turns: bool = False) -> Case:
+    """Return the case with evenly spaced rows of each run, some `most` in all.
 
-    They are evenly spaced in each half cycle, but for its last one: what is left of
-    AR(1) noise is AR(1).
+    A thinned AR(1) series is AR(1) with its coefficient to the power of the step; means
+    of neighbours are not. With `turns` rows are counted from the turns of the path on,
+    which are then kept, unless half cycles are hardly longer than the step.
     """
     step = -(-len(case.records.force) // most)
     if step == 1:
         return case
     order = np.argsort(np.asarray(case.records.run), kind="stable")
     records = take_rows(case.records, order)
-    label = half_cycles(records)
+    turns &= half_cycle_rows(records) >= 2 * step
+    label = half_cycles(records) if turns else np.asarray(records.run)
     last = np.diff(label, append=label[-1] + 1) != 0
     rows, begins = np.arange(len(label)), np.diff(label, prepend=label[0] - 1) != 0
     place = rows - np.maximum.accumulate(np.where(begins, rows, 0))
-    kept = np.flatnonzero((place % step == 0) | last)
+    kept = np.flatnonzero((place % step == 0) | (turns & last))
     return replace(case, records=take_rows(records, kept))
 
 

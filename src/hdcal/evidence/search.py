@@ -33,7 +33,7 @@ from hdcal.physics.effect import Effect
 _CONTEXTS, _MOST_NOISES, _LEAST_NOISE = 8, 2, 0.03
 # Log evidence below the best given a context from which on a hypothesis is left out.
 _HOPELESS = 25.0
-# Pairs that are evaluated with a remainder.
+# Pairs that are evaluated with a remainder, and hypotheses whose remainder grows.
 _BEST = 3
 # Most kernels of a remainder, and prior odds of one more.
 _MOST_KERNELS, _ONE_MORE = 4, 0.25
@@ -167,7 +167,7 @@ class Searched:
     def fitted_correlations(self) -> None:
         """Enter everything alone with the correlations that two hypotheses leave.
 
-        Where rows are many, one between two of the grid fits much better than either.
+        Where rows are many, a correlation between two of the grid may fit much better.
         """
         table, problem = self.table, self.problem
         for key in dict.fromkeys([(), table.ranked()[0]]):

@@ -136,8 +136,8 @@ class _Run:
             # Stretches end with the warm-up, for few lengths.
             left = (warmup if self._done < warmup else total) - self._done
             size = {"warmup": warmup, "length": min(_STRETCH, left)}
-            # A chain uses one processor.
             advance = partial(_advance, *self._arguments, target=self._target, **size)
+            # Each chain uses one processor.
             with ThreadPoolExecutor() as pool:
                 moved = [*pool.map(advance, self._states)]
             self._states = [state for state, _ in moved]
