@@ -5,7 +5,6 @@ import os
 import shutil
 import sys
 import tempfile
-import zlib
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -30,17 +29,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--part", help=words)
 
 
+@pytest.hookimpl(trylast=True)  # of the tests that -m has chosen
 def pytest_collection_modifyitems(
     config: pytest.Config, items: list[pytest.Item]
 ) -> None:
     """Keep the files of the part that was asked for."""
     if part := config.getoption("--part"):
         one, of = map(int, part.split("/"))
-        files = [item.nodeid.partition("::")[0] for item in items]
-        theirs = [zlib.crc32(name.encode()) % of == one % of for name in files]
-        left_out = [item for item, kept in zip(items, theirs, strict=True) if not kept]
+        file_of = {item: item.nodeid.partition("::")[0] for item in items}
+        kept = set(sorted(set(file_of.values()))[one % of :: of])
+        left_out = [item for item in items if file_of[item] not in kept]
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item, kept in zip(items, theirs, strict=True) if kept]
+        items[:] = [item for item in items if file_of[item] in kept]
 
 
 def pytest_configure(config: pytest.Config) -> None:
