@@ -11,11 +11,13 @@ from hdcal.data.case import Case
 from hdcal.diagnosis import decision
 from hdcal.diagnosis.acting import Acting, acts_in
 from hdcal.diagnosis.decision import Decision
-from hdcal.diagnosis.which import Cause
+from hdcal.diagnosis.gap import nearest_effects
+from hdcal.diagnosis.which import Cause, Which
 from hdcal.evidence.linear_problem import linear_problem
 from hdcal.evidence.noise_models import NoiseModel
 from hdcal.evidence.search import search
 from hdcal.physics.registry import EFFECTS
+from hdcal.report.item import Interval
 
 HYSTERESIS = {"hysteresis": {"force": 4.0, "reach": 0.1}}
 PLANTED = {
@@ -153,6 +155,47 @@ def test_a_withheld_effect_is_outside():
     found = decide(simulated(rich(), drift, seed=1), library)
     assert found.gap > 0.99 and found.explanations[0].outside
     assert not [each for each in found.which.causes if each.probability >= 0.9]
+
+
+@pytest.mark.parametrize(
+    ("chance", "share", "outside", "mostly"),
+    [
+        (0.9, 0.3, 0.4, True),
+        (0.9, 0.5, 0.4, False),
+        (0.4, 0.3, 0.4, False),
+        (0.9, None, 0.4, True),
+    ],
+)
+def test_most_is_outside_where_no_effect_that_acts_explains_more(
+    chance: float, share: float | None, outside: float, mostly: bool
+):
+    def cause(members, probability, middle):
+        share = Interval(median=middle, lo=0.0, hi=1.0)
+        return Cause(members=members, probability=probability, explains=share)
+
+    which = Which.model_construct(
+        causes=() if share is None else (cause(("hysteresis",), 0.8, share),),
+        outside=cause((), chance, outside),
+    )
+    assert which.mostly_outside == mostly
+
+
+def test_the_nearest_effects_explain_what_least_squares_with_them_does():
+    planted = {"amplifier_drift": {"rate": 0.02}}
+    case, records = simulated(rich(), planted, seed=1), rich()
+    x, time = np.asarray(records.deformation), np.asarray(records.time)
+    wave = 3.0 * np.sin(2.0 * np.pi * 4.0 * (x / 0.54) ** 2.5)
+    case = with_force(case, case.records.force + wave)
+    library = {name: EFFECTS[name] for name in (*PLANTED, "viscous_damping")}
+    searched = search(case, library)
+    names, share = nearest_effects(searched, noise_sd=0.0)
+    left = []
+    for columns in ([], [time]):
+        design = np.stack([np.ones_like(x), x, *columns], axis=1)
+        fit = np.linalg.lstsq(design, np.asarray(case.records.force), rcond=None)
+        left.append(float(fit[1][0]))
+    assert names == ("amplifier_drift",)
+    assert share == pytest.approx(1.0 - np.sqrt(left[1] / left[0]), abs=0.02)
 
 
 def test_an_effect_beside_a_wave_has_its_share():

@@ -92,7 +92,7 @@ def test_the_gears_with_an_effect_are_named(with_loop):
         assert each.probability > each.probability_alone
     assert any(f"diagnose {gear} alone" in with_loop.next_step for gear in WITH_LOOP)
     obeys(with_loop.to_dict(), FleetCauses)
-    assert "coulomb friction" in with_loop.text()
+    assert "Coulomb friction" in with_loop.text()
     assert len(with_loop.common) >= 2
 
 

@@ -61,17 +61,17 @@ def classes(
             (key for key in posterior if leader in key),
             key=lambda key: posterior[key].sum(),
         )
-        group, curve = [leader], _direction(searched, key, leader)
+        group, curve = [leader], direction(searched, key, leader)
         for name in left:
             possible = chance(name, without=group) >= _EXCLUDED * most
-            if possible and curve @ _direction(searched, (name,), name) >= ALIKE:
+            if possible and curve @ direction(searched, (name,), name) >= ALIKE:
                 group.append(name)
         left = [name for name in left if name not in group]
         found.append(tuple(group))
     return found
 
 
-def _direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, " n"]:
+def direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, " n"]:
     """Return what the base model leaves of an effect of a hypothesis, of unit length.
 
     Zero where the hypothesis has no evidence.

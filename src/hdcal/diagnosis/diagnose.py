@@ -1,6 +1,6 @@
 """Diagnose a case: where model and readings part, which effect causes it, how far."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +13,19 @@ from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.charts import FORMULA
 from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide
-from hdcal.diagnosis.gap import Fitted, closed_on_left_out, fitted, gap_by_row
+from hdcal.diagnosis.gap import (
+    Fitted,
+    closed_on_left_out,
+    fitted,
+    gap_by_row,
+    nearest_effects,
+)
 from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.patterns import find_patterns
 from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate
-from hdcal.diagnosis.result import Data, Diagnosis, Gap, HowFar, Refit, Rung
-from hdcal.diagnosis.which import LIKELY, effect_words
+from hdcal.diagnosis.result import Data, Diagnosis, Gap, HowFar, Nearest, Refit, Rung
+from hdcal.diagnosis.which import LIKELY, Which
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.noise_models import OUTLIERS
 from hdcal.evidence.search import Searched, search
@@ -29,6 +35,7 @@ from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.report.item import Interval
+from hdcal.report.words import label
 from hdcal.versions import versions
 
 if TYPE_CHECKING:
@@ -69,7 +76,7 @@ def diagnose(
     names = [cause.members[0] for cause in found.which.on_mean]
     fit = fitted(searched, posterior, names)
     excluded = [
-        f"{effect_words(name)} is excluded: the gear file fixes its amplitude at zero"
+        f"{label(name)} is excluded: the gear file fixes its amplitude at zero"
         for name in searched.excluded
     ]
     calibrated, fits = read, Refits({}, None, ())
@@ -82,7 +89,7 @@ def diagnose(
         gap=_gap(case, found, fit),
         seen=find_patterns(searched.problem, case),
         which=found.which,
-        how_far=_how_far(case, searched, fit, names, rng),
+        how_far=_how_far(case, searched, found.which, fit, rng),
         next_test=tuple(
             run.model_copy(update={"run": case.units.say(run.run)})
             for run in rank_runs(searched, posterior)
@@ -181,23 +188,32 @@ def _stiffness(fits: Refits) -> Interval | None:
 def _how_far(
     case: Case,
     searched: Searched,
+    which: Which,
     fit: Fitted,
-    names: Sequence[str],
     rng: np.random.Generator,
 ) -> HowFar:
-    closed, word = None, ""
-    if names:
+    closed, word, nearest = None, "", None
+    if names := [cause.members[0] for cause in which.on_mean]:
         closed, word = closed_on_left_out(searched, fit, names, rng)
+    if which.mostly_outside and searched.components.names:
+        effects, share = nearest_effects(searched, fit.noise_sd)
+        if {*effects}.isdisjoint(name for c in which.on_mean for name in c.members):
+            nearest = Nearest(effects=effects, explains=share)
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():
         if name != OUTSIDE or len(fit.rms) > 1:
-            words = "outside the library" if name == OUTSIDE else effect_words(name)
+            words = "outside the library" if name == OUTSIDE else label(name)
             model = f"+ {words}" if name else "calibrated straight model"
             ladder.append(Rung(model=model, rms_N=size))
     wild = fit.noise.name == OUTLIERS
     noise = "noise without outliers" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
-    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word)
+    return HowFar(
+        ladder=tuple(ladder),
+        closed=closed,
+        left_out=word,
+        nearest=nearest,
+    )
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

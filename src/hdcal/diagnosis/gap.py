@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from hdcal.data.records import Records
+from hdcal.diagnosis.acting import ALIKE, direction
 from hdcal.evidence.components import Components, components
 from hdcal.evidence.evaluation import select
 from hdcal.evidence.linear_problem import LinearProblem
@@ -94,6 +95,27 @@ def fitted(
     used = len(found.mean) - float(np.sum(found.factor**2))
     free = max(problem.count - used, 1.0)
     return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
+
+
+def nearest_effects(
+    searched: Searched, noise_sd: float
+) -> tuple[tuple[str, ...], float]:
+    """Return the effect that explains most of the gap alone, and its share of it.
+
+    Effects whose curves coincide with its own follow it. The share is 1 − √(G₁/G₀), G
+    the mean square of what is left beyond the noise of a fit to everything.
+    """
+    problem, table, left = searched.problem, searched.table, {}
+    for key in [(), *table.ranked(1)]:
+        if key != (OUTSIDE,):
+            found = posterior(problem, table.likeliest_noise(key), table.parts[key])
+            square = np.mean((problem.y - found.reading) ** 2)
+            left[key] = max(float(square) - noise_sd**2, 0.0)
+    first, *others = sorted(left.keys() - {()}, key=lambda key: left[key])
+    curve = direction(searched, first, *first)
+    alike = [k for k in others if curve @ direction(searched, k, *k) >= ALIKE]
+    share = float(_closed(left[()], left[first]))
+    return sum(alike, start=first), share
 
 
 def closed_on_left_out(

@@ -82,7 +82,7 @@ def candidate_runs(
     elif abs(first - last) > _SAME:
         words = f"return to the first temperature, {first:.0f} °C, and load again"
         yield run(words, 6.0, loop, temperature=first)
-    words = "re-seat the gear and load again in finer steps at small {displacement}s"
+    words = "re-seat the part and load again in finer steps at small {displacement}s"
     yield run(words, 2.0, paths["fine"])
     yield run(
         "small cycles between 0.5 and 0.7 of the largest {displacement}",
@@ -92,9 +92,9 @@ def candidate_runs(
     yield run("load to 1.25 times the largest {displacement}", 5.0, paths["beyond"])
     if np.ptp(records.angle) < np.pi / 2.0:
         angle = float(records.angle[-1]) + np.pi / 2.0
-        yield run("turn the gear by 90° and load again", 2.0, paths["up"], angle=angle)
+        yield run("turn the part by 90° and load again", 2.0, paths["up"], angle=angle)
     if "specimens" not in known:
-        words, gear = "load a second gear of the same kind", int(records.specimen[0])
+        words, gear = "load a second part of the same kind", int(records.specimen[0])
         yield run(words, 8.0, paths["up"], specimen=gear + 1)
 
 

@@ -10,7 +10,7 @@ from hdcal.diagnosis.charts import gap_chart, ladder_chart, which_chart
 from hdcal.diagnosis.gap import GapByRow
 from hdcal.diagnosis.next_run import NextRun
 from hdcal.diagnosis.patterns import Seen
-from hdcal.diagnosis.which import Cause, Which, share_words
+from hdcal.diagnosis.which import Cause, Which, either, share_words
 from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.report.charts.chart_spec import Chart
@@ -49,16 +49,31 @@ class Rung(Item):
     rms_N: float
 
 
+class Nearest(Item):
+    """Effects of one curve that alone would explain most of the gap, and its share."""
+
+    effects: tuple[EffectName, ...]
+    explains: float
+
+    @property
+    def words(self) -> str:
+        """The effects in a sentence."""
+        return either(self.effects)
+
+
 class HowFar(Item):
     """How far the gap closes, from the formula alone down to the noise.
 
     `closed` is the share that the acting effects close on rows that they were not
-    fitted to, None without any; `left_out` is what was left out of each fit.
+    fitted to, None without any; `left_out` is what was left out of each fit. `nearest`
+    are effects that do not act, where something outside the library explains more than
+    any that does.
     """
 
     ladder: tuple[Rung, ...]
     closed: Interval | None
     left_out: str
+    nearest: Nearest | None
 
     @property
     def share(self) -> str:

@@ -16,29 +16,19 @@ LIKELY = 0.5
 MATTERS = 2.5e-4
 # Names of a class in a sentence: where there are more, two and the number of others.
 _MOST = 3
-_WORDS = {
-    GROWING: "noise that grows with the load",
-    OUTLIERS: "outliers",
-    "coulomb_friction": "Coulomb friction",
-}
 ON_NOISE = (GROWING, OUTLIERS)
 
 VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
 
 
-def effect_words(name: str) -> str:
-    """Return the name of an effect in a sentence."""
-    return _WORDS.get(name, label(name))
-
-
 def together(effects: Sequence[str]) -> str:
     """Return effects that act together, those on the noise last."""
-    return " + ".join(map(effect_words, sorted(effects, key=ON_NOISE.__contains__)))
+    return " + ".join(map(label, sorted(effects, key=ON_NOISE.__contains__)))
 
 
 def either(members: Sequence[str]) -> str:
     """Return effects that are not separated: `a, b or c`, the most probable first."""
-    words = [*map(effect_words, members)]
+    words = [*map(label, members)]
     if len(words) > _MOST:
         others = len(words) - _MOST + 1
         words = [*words[: _MOST - 1], f"one of {others} other effects"]
@@ -48,9 +38,9 @@ def either(members: Sequence[str]) -> str:
 
 def share_words(share: Interval) -> str:
     """Return a share of the gap with its interval."""
-    median, low, high = (
-        f"{end:.0%}"[:-1] for end in (share.median, share.lo, share.hi)
-    )
+    # z: a rounded zero has no sign.
+    ends = share.median, share.lo, share.hi
+    median, low, high = (f"{100.0 * end:z.0f}" for end in ends)
     return f"{median} % ({low} … {high} %) of the gap"
 
 
@@ -169,6 +159,14 @@ class Which(Item):
         found = [each for each in self.acting if not each.on_noise]
         shares = {c: c.explains.median if c.explains else 0.0 for c in found}
         return tuple(sorted(found, key=lambda each: -shares[each]))
+
+    @property
+    def mostly_outside(self) -> bool:
+        """Whether something outside the library explains more than any effect."""
+        if self.outside.probability <= LIKELY or not self.on_mean:
+            return self.outside.probability > LIKELY
+        most, rest = self.on_mean[0].explains, self.outside.explains
+        return bool(most and rest and rest.median > most.median)
 
     @property
     def on_noise(self) -> tuple[Cause, ...]:

@@ -29,6 +29,11 @@ _PARAMETERS: dict[str, tuple[str, str, float]] = {
     "initial_velocity": ("speed at the first row", "mm/s", 1.0),
     "deformation_sigma": ("noise of the {displacement} reading", "mm", 1.0),
 }
+# Effects whose names are not words of a sentence.
+_EFFECTS = {
+    "coulomb_friction": "Coulomb friction",
+    "heteroscedastic_noise": "noise that grows with the load",
+}
 UNITS = {name: (unit, factor) for name, (_, unit, factor) in _PARAMETERS.items()}
 _FAMILY_WORDS = {
     "fixed": "exactly {0}{unit}",
@@ -95,14 +100,13 @@ def prior_words(name: str, prior: Prior, units: Quantities = FORCE) -> str:
 
 
 def label(name: str, theory: str = "", units: Quantities = FORCE) -> str:
-    """Return the label of a parameter under a theory."""
+    """Return the label of an effect, or of a parameter under a theory."""
     if name == "K" and theory == SPRING:
         return f"{units.stiffness} K"
     effect, dot, parameter = name.partition(".")
-    if dot:
-        return f"{effect}: {parameter}".replace("_", " ")
     if name not in _PARAMETERS:
-        return name.replace("_", " ")
+        words = _EFFECTS.get(effect, effect.replace("_", " "))
+        return words + dot.replace(".", ": ") + parameter.replace("_", " ")
     text = _PARAMETERS[name][0]
     return text.format(load=units.load, displacement=units.displacement)
 
