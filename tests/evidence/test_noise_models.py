@@ -24,13 +24,17 @@ from hdcal.physics.registry import EFFECTS
 ROWS, NOISE = 9, 0.4
 
 
-def problem_of(error: np.ndarray, order: np.ndarray | None = None) -> LinearProblem:
-    """Return a loaded spring with errors, its deformations in some order."""
+def problem_of(
+    error: np.ndarray, order: np.ndarray | None = None, sense: np.ndarray | None = None
+) -> LinearProblem:
+    """Return a spring with errors, its deformations in some order and direction."""
     records = ramp(len(error))
     case = make_case(records, make_gear())
     if order is not None:
         deformation = np.asarray(records.deformation)[order]
         object.__setattr__(case.records, "deformation", deformation)
+    if sense is not None:
+        object.__setattr__(case.records, "sense", sense)
     force = 195.0 * np.asarray(case.records.deformation) + 1.0 + error
     object.__setattr__(case.records, "force", force)
     return linear_problem(case, EFFECTS, noise_sd=NOISE)
@@ -94,6 +98,29 @@ def test_outliers_do_not_agree_with_neighbours(place: str, sides: list, found: b
     error = rng.normal(0.0, NOISE, rows)
     error[some] += 8.0 * np.resize(sides, len(some))
     problem = problem_of(error, order)
+
+    def fitted(weight):
+        return posterior(problem, NoiseModel("", weight, 0.0, 0.0), []).reading
+
+    assert bool(outliers(problem, 0.0, fitted)) == found
+
+
+@pytest.mark.parametrize(
+    ("place", "found"), [("turn", False), ("burst", True), ("random", True)]
+)
+def test_outliers_are_at_no_place_of_the_cycle(place: str, found: bool):
+    """Errors of either side; a burst is at one place too, of one cycle."""
+    rows, rng = 480, np.random.default_rng(4)
+    step = np.arange(rows) % 60
+    order, sense = np.minimum(step, 59 - step), np.where(step < 30, 1.0, -1.0)
+    some = {
+        "turn": np.arange(1, rows, 60),
+        "burst": np.arange(100, 108),
+        "random": rng.choice(rows, 8, replace=False),
+    }[place]
+    error = rng.normal(0.0, NOISE, rows)
+    error[some] += 8.0 * np.resize([1.0, -1.0], len(some))
+    problem = problem_of(error, order, sense)
 
     def fitted(weight):
         return posterior(problem, NoiseModel("", weight, 0.0, 0.0), []).reading

@@ -16,7 +16,7 @@ from hdcal.evidence.parameter_grid import (
     is_zero_centred,
     prior_rms,
 )
-from hdcal.evidence.row_features import half_cycle_rows
+from hdcal.evidence.row_features import half_cycle_rows, half_cycles
 from hdcal.inference.distributions import quantiles
 from hdcal.screening.turning_points import MEDIAN_SIZE
 
@@ -32,7 +32,7 @@ _SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
-# Significance level of the test of runs of outliers.
+# Significance level of the tests of where outliers lie.
 _CHANCE = 0.01
 
 
@@ -193,22 +193,35 @@ def _beta_numbers(prior: Prior) -> tuple[float, float]:
 
 
 def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
-    """Whether wild errors [N] agree with neighbours more often than by chance.
+    """Whether wild errors [N] are not at random rows, either in time or in a cycle.
 
-    Neighbours in time, or in the deformation in one direction; rows that are not wild
-    have an error of 0. A disturbance may last for two readings. The number of runs of
-    disturbances at random places is hypergeometric (Wald and Wolfowitz, Ann. Math.
-    Stat. 11, 1940).
+    Rows that are not wild have an error of 0. A disturbance may last for two readings.
+    The order of a cycle is that of the deformation upwards and then downwards. Of
+    disturbances at random rows the number of runs of one sign is hypergeometric (Wald
+    and Wolfowitz, Ann. Math. Stat. 11, 1940). A burst of noise is in one half cycle, a
+    structure at one place of several, k: of as many random places on a circle the
+    longest gap is the share g of it, or more, with a probability of k (1 − g)ᵏ⁻¹ at
+    most (Stevens, Ann. Eugen. 9, 1939).
     """
-    records, rows = problem.records, len(wild)
-    disturbances = -(-int(np.count_nonzero(wild)) // 2)
-    if disturbances < 2:
+    records, rows = problem.records, np.arange(len(wild))
+    begins = np.diff(np.sign(wild), prepend=0.0) != 0.0
+    age = rows - np.maximum.accumulate(np.where(begins, rows, 0))
+    disturbed = np.where(age % 2 == 0, np.sign(wild), 0.0)
+    count = np.count_nonzero(disturbed)
+    if count < 2:
         return False
-    place = np.lexsort([records.deformation, records.sense])
-    runs = []
-    for order in (np.arange(rows), place):
-        side = np.sign(wild[order])
-        begins = np.diff(side, prepend=0.0) != 0.0
-        runs.append(np.count_nonzero(begins & (side != 0.0)))
-    chance = hypergeom.cdf(runs, rows, rows - disturbances + 1, disturbances)
-    return bool(np.min(chance) < _CHANCE / len(runs))
+    cycle = np.lexsort([records.sense * records.deformation, -records.sense])
+    numbers = len(rows), len(rows) - count + 1, count
+    runs = [_runs(np.sign(wild)), _runs(disturbed[cycle])]
+    chances = [hypergeom.cdf(each, *numbers) for each in runs]
+    places = np.flatnonzero(disturbed[cycle])
+    gap = np.diff(places, append=places[0] + len(rows)).max() / len(rows)
+    several = len(np.unique(half_cycles(records)[disturbed != 0.0]))
+    chances.append(several * (1.0 - gap) ** (several - 1))
+    return bool(np.min(chances) < _CHANCE / len(chances))
+
+
+def _runs(signs: Float[np.ndarray, " n"]) -> int:
+    """Return the number of runs of one sign."""
+    begins = np.diff(signs, prepend=0.0) != 0.0
+    return np.count_nonzero(begins & (signs != 0.0))
