@@ -230,10 +230,11 @@ class Searched:
             parts, before = table.parts[key], table.log_evidence[key].max()
             others = [part for part in parts if part.component != outside]
             own = [part for part in parts if part.component == outside]
+            signs = {column: self._signs(column, parts) for column in columns}
             for column, found in self._evaluate(columns, parts, {outside}).items():
                 more = [*others, merged([*own, found.likeliest(outside)])]
                 gain = found.totals()[outside] - found.none + np.log(_ONE_MORE)
-                gain += self._signs(column, parts, more)
+                gain += min(self._signs(column, more) - signs[column], 0.0)
                 value = table.log_evidence[key][column] + gain
                 table.put(key, column, value, lambda more=more: more)
             if table.log_evidence[key].max() <= before:
@@ -246,7 +247,7 @@ class Searched:
         table = self.table
         key = tuple(sorted(table.names[part.component] for part in parts))
         for column, found in self._evaluate(columns, parts, only).items():
-            gain = found.totals() - found.none
+            gain, signs = found.totals() - found.none, self._signs(column, parts)
             start = table.log_evidence[key][column]
             if len(parts) == 1 and parts[0].place is not None:
                 start = self.found_alone[column].of_part(parts[0])
@@ -256,13 +257,11 @@ class Searched:
                 if len(names - {OUTSIDE}) > 2:
                     continue
                 both = [*parts, found.likeliest(int(k))]
-                value = start + gain[k] + self._signs(column, parts, both)
+                # Another component makes signs less probable; more probable is no gain.
+                change = min(self._signs(column, both) - signs, 0.0)
+                value = start + gain[k] + change
                 table.put(tuple(names), column, value, lambda both=both: both)
 
-    def _signs(self, column: int, parts: list[Part], more: list[Part]) -> float:
-        """Return the change of the log probability of signs, which is no gain."""
-        before, after = (
-            log_sign_probability(self.problem, self.table.noises[column], each)
-            for each in (parts, more)
-        )
-        return min(after - before, 0.0)
+    def _signs(self, column: int, parts: list[Part]) -> float:
+        """Return the log probability of the signs of one-sided amplitudes."""
+        return log_sign_probability(self.problem, self.table.noises[column], parts)
