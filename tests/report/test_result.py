@@ -208,3 +208,11 @@ def test_no_number_of_a_table_is_cut_in_a_narrow_terminal(width: int):
     # A name wraps where it must, and is whole if there is room.
     assert name.startswith(row.split()[0]) and "…" not in row.replace(cells[1], "")
     assert (name in row) == (width >= 58)
+
+
+@pytest.mark.parametrize(("width", "whole"), [(80, True), (34, True), (33, False)])
+def test_a_title_is_on_one_line_if_all_columns_have_room(width: int, whole: bool):
+    header, row = "| the effect alone | share of the gap |", "| contact onset | 12 % |"
+    text = drawn([_Markdown(f"{header}\n|---|---:|\n{row}")], width)
+    assert ("share of the gap" in text) == whole
+    assert "contact onset" in text and "12 %" in text

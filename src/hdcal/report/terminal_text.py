@@ -49,12 +49,15 @@ class _Table(TableElement):
             _needed(cell.content.plain, texts, numbers=cell.justify == "right")
             for cell, texts in zip(header, columns, strict=True)
         ]
-        tight = sum(widths) + _GAP * (len(widths) - 1) > options.max_width
+        room = options.max_width - _GAP * (len(widths) - 1)
+        tight = sum(widths) > room
+        every = zip(header, columns, strict=True)
+        longest = [max(map(len, [c.content.plain, *texts])) for c, texts in every]
         for cell, texts, width in zip(header, columns, widths, strict=True):
             right, title = cell.justify == "right", cell.content.plain
             # A column of words wraps where numbers would lose digits.
             whole = right or (not tight and max(map(len, texts), default=0) <= width)
-            if whole and title:
+            if whole and title and sum(longest) > room:
                 # A column that does not wrap would not wrap its title either.
                 title = fill(title, width, break_long_words=False)
             justify = "right" if right else "left"
