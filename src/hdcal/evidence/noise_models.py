@@ -198,10 +198,8 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     Rows that are not wild have an error of 0. A disturbance may last for two readings.
     The order of a cycle is that of the deformation upwards and then downwards. Of
     disturbances at random rows the number of runs of one sign is hypergeometric (Wald
-    and Wolfowitz, Ann. Math. Stat. 11, 1940). A burst of noise is in one half cycle, a
-    structure at one place of several, k: of as many random places on a circle the
-    longest gap is the share g of it, or more, with a probability of k (1 − g)ᵏ⁻¹ at
-    most (Stevens, Ann. Eugen. 9, 1939).
+    and Wolfowitz, Ann. Math. Stat. 11, 1940), and several cycles have them at few
+    places of a cycle by chance only.
     """
     records, rows = problem.records, np.arange(len(wild))
     begins = np.diff(np.sign(wild), prepend=0.0) != 0.0
@@ -214,10 +212,11 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     numbers = len(rows), len(rows) - count + 1, count
     runs = [_runs(np.sign(wild)), _runs(disturbed[cycle])]
     chances = [hypergeom.cdf(each, *numbers) for each in runs]
-    places = np.flatnonzero(disturbed[cycle])
-    gap = np.diff(places, append=places[0] + len(rows)).max() / len(rows)
-    several = len(np.unique(half_cycles(records)[disturbed != 0.0]))
-    chances.append(several * (1.0 - gap) ** (several - 1))
+    cycles = max(int(half_cycles(records)[-1] + 1) // 2, 1)
+    # Places have a row of each cycle, and may begin at any of so many rows.
+    found = np.arange(cycles)[:, None] + np.flatnonzero(disturbed[cycle])
+    fewest = min(len(np.unique(each)) for each in found // cycles)
+    chances.append(cycles * _few_places(fewest, count, cycles, len(rows)))
     return bool(np.min(chances) < _CHANCE / len(chances))
 
 
@@ -225,3 +224,16 @@ def _runs(signs: Float[np.ndarray, " n"]) -> int:
     """Return the number of runs of one sign."""
     begins = np.diff(signs, prepend=0.0) != 0.0
     return np.count_nonzero(begins & (signs != 0.0))
+
+
+def _few_places(most: int, count: int, size: int, rows: int) -> float:
+    """Return the probability that random rows are at so many places of a size at most.
+
+    The rows are drawn one after the other, the next one at a place that has one or not.
+    """
+    chance = np.ones(1)
+    for drawn in range(count):
+        taken = np.minimum(size * np.arange(len(chance)), rows)
+        again, new = chance * np.maximum(taken - drawn, 0), chance * (rows - taken)
+        chance = (np.append(again, 0.0) + np.append(0.0, new)) / (rows - drawn)
+    return float(chance[: most + 1].sum())
