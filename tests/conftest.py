@@ -24,8 +24,8 @@ if version("jaxlib").startswith("0.10."):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Let a run take some of the files: --part 3/8, those of every eighth run."""
-    words = "I/N: the tests of one in N files, another one in N for another I"
+    """Let a run take some of the files: --part 3/8, every eighth of them."""
+    words = "I/N: part I of N of the files with tests"
     parser.addoption("--part", help=words)
 
 
@@ -36,11 +36,9 @@ def pytest_collection_modifyitems(
     """Keep the files of the part that was asked for."""
     if part := config.getoption("--part"):
         one, of = map(int, part.split("/"))
-        file_of = {item: item.nodeid.partition("::")[0] for item in items}
-        kept = set(sorted(set(file_of.values()))[one % of :: of])
-        left_out = [item for item in items if file_of[item] not in kept]
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if file_of[item] in kept]
+        kept = {*sorted({item.path for item in items})[one % of :: of]}
+        config.hook.pytest_deselected(items=[i for i in items if i.path not in kept])
+        items[:] = [item for item in items if item.path in kept]
 
 
 def pytest_configure(config: pytest.Config) -> None:

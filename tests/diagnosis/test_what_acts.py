@@ -11,7 +11,7 @@ from hdcal.data.case import Case
 from hdcal.diagnosis import decision
 from hdcal.diagnosis.acting import Acting, acts_in
 from hdcal.diagnosis.decision import Decision
-from hdcal.diagnosis.gap import nearest_effects
+from hdcal.diagnosis.gap import Fitted, nearest_effects
 from hdcal.diagnosis.which import Cause, Which
 from hdcal.evidence.linear_problem import linear_problem
 from hdcal.evidence.noise_models import NoiseModel
@@ -188,7 +188,8 @@ def test_the_nearest_effects_explain_what_least_squares_with_them_does():
     case = with_force(case, case.records.force + wave)
     library = {name: EFFECTS[name] for name in (*PLANTED, "viscous_damping")}
     searched = search(case, library)
-    names, share = nearest_effects(searched, noise_sd=0.0)
+    noise = NoiseModel("", np.ones(len(x)), 0.0, 0.0)
+    names, share = nearest_effects(searched, Fitted(noise, 0.0, {}))
     left = []
     for columns in ([], [time]):
         design = np.stack([np.ones_like(x), x, *columns], axis=1)

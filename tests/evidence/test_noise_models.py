@@ -108,7 +108,7 @@ def test_outliers_do_not_agree_with_neighbours(place: str, sides: list, found: b
 @pytest.mark.parametrize(
     ("place", "found"), [("turn", False), ("burst", True), ("random", True)]
 )
-def test_outliers_are_at_no_place_of_the_cycle(place: str, found: bool):
+def test_outliers_do_not_recur_at_a_place_of_the_cycle(place: str, found: bool):
     """Errors of either side; a burst is at one place too, of one cycle."""
     rows, rng = 480, np.random.default_rng(4)
     step = np.arange(rows) % 60

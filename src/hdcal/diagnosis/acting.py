@@ -43,7 +43,8 @@ def classes(
 
     The likeliest effect, as fitted in its likeliest hypothesis, is in one class with
     all that the readings do not exclude in its place and whose curves, each fitted
-    alone, coincide with it. An effect is in one class at most.
+    alone, coincide with it, or differ on unloading that was not measured. An effect is
+    in one class at most.
     """
     keys = [{*key} for key in posterior]
     weights = np.array([each.sum() for each in posterior.values()])
@@ -64,11 +65,19 @@ def classes(
         group, curve = [leader], direction(searched, key, leader)
         for name in left:
             possible = chance(name, without=group) >= _EXCLUDED * most
-            if possible and curve @ direction(searched, (name,), name) >= ALIKE:
+            alike = possible and curve @ direction(searched, (name,), name) >= ALIKE
+            if alike or _differ_on_unloading(searched, leader, name):
                 group.append(name)
         left = [name for name in left if name not in group]
         found.append(tuple(group))
     return found
+
+
+def _differ_on_unloading(searched: Searched, *names: str) -> bool:
+    """Whether effects are bends on loading that only unloading would separate."""
+    effects = [searched.effects[name] for name in names]
+    loops = all(each.family == "loop" and not each.instantaneous for each in effects)
+    return loops and "unloading" not in searched.problem.records.known
 
 
 def direction(searched: Searched, key: Names, name: str) -> Float[np.ndarray, " n"]:

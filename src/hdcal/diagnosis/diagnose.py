@@ -11,6 +11,7 @@ from hdcal.data.case import Case, from_contact, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.data.theory_names import SPRING
+from hdcal.diagnosis.acting import CARRIED
 from hdcal.diagnosis.charts import FORMULA
 from hdcal.diagnosis.decision import TEMPERATURE, Decision, decide
 from hdcal.diagnosis.gap import (
@@ -119,8 +120,11 @@ def _check(case: Case, effects: Mapping[str, type[Effect]], seed: int) -> None:
         wrong += implausible("seed", seed)
     check_effect_priors(case, {**EFFECTS, **effects})
     require_scatter(case)
-    deformation = case.records.deformation - np.mean(case.records.deformation)
-    if deformation @ np.asarray(case.records.force) > 0.0:
+    records = case.records
+    x, force = np.asarray(records.deformation), np.asarray(records.force)
+    # Of a part that yields the whole curve may fall, but not from row to row.
+    step = np.diff(x) * (np.diff(records.run) == 0)
+    if (x - x.mean()) @ force > 0.0 or step @ np.diff(force) > 0.0:
         return
     units = case.units
     words = f"the {units.load} does not increase with the {units.displacement}"
@@ -171,8 +175,10 @@ def _stiffness(fits: Refits) -> Interval | None:
     """Return the stiffness as read over all models [N/mm].
 
     None where it means different things: beside an effect that bends the curve it is
-    the slope of one part of it.
+    the slope of one part of it. None also where most hypotheses have no calibration.
     """
+    if fits.left_out and fits.left_out.probability > LIKELY:
+        return None
     bends = {
         frozenset(e.name for e in fit.effects if e.family.startswith("curve"))
         for _, fit in fits.posteriors.values()
@@ -196,8 +202,9 @@ def _how_far(
     if names := [cause.members[0] for cause in which.on_mean]:
         closed, word = closed_on_left_out(searched, fit, names, rng)
     if which.mostly_outside and searched.components.names:
-        effects, share = nearest_effects(searched, fit.noise_sd)
-        if {*effects}.isdisjoint(name for c in which.on_mean for name in c.members):
+        effects, share = nearest_effects(searched, fit)
+        acting = {name for cause in which.on_mean for name in cause.members}
+        if share >= CARRIED and acting.isdisjoint(effects):
             nearest = Nearest(effects=effects, explains=share)
     ladder = [] if case.gear.theory == SPRING else [_formula(case, searched)]
     for name, size in fit.rms.items():

@@ -97,25 +97,24 @@ def fitted(
     return Fitted(noise, float(np.sqrt(left @ left / free)), rms)
 
 
-def nearest_effects(
-    searched: Searched, noise_sd: float
-) -> tuple[tuple[str, ...], float]:
+def nearest_effects(searched: Searched, fit: Fitted) -> tuple[tuple[str, ...], float]:
     """Return the effect that explains most of the gap alone, and its share of it.
 
     Effects whose curves coincide with its own follow it. The share is 1 − √(G₁/G₀), G
-    the mean square of what is left beyond the noise of a fit to everything.
+    the mean square of what is left beyond the noise of a fit, which weighs the rows;
+    NaN where that is nothing.
     """
     problem, table, left = searched.problem, searched.table, {}
     for key in [(), *table.ranked(1)]:
         if key != (OUTSIDE,):
-            found = posterior(problem, table.likeliest_noise(key), table.parts[key])
-            square = np.mean((problem.y - found.reading) ** 2)
-            left[key] = max(float(square) - noise_sd**2, 0.0)
+            found = posterior(problem, fit.noise, table.parts[key])
+            square = np.mean(((problem.y - found.reading) * fit.noise.weight) ** 2)
+            left[key] = float(square) - fit.noise_sd**2
     first, *others = sorted(left.keys() - {()}, key=lambda key: left[key])
     curve = direction(searched, first, *first)
     alike = [k for k in others if curve @ direction(searched, k, *k) >= ALIKE]
     share = float(_closed(left[()], left[first]))
-    return sum(alike, start=first), share
+    return (*first, *(name for (name,) in alike)), share
 
 
 def closed_on_left_out(

@@ -50,7 +50,7 @@ class Rung(Item):
 
 
 class Nearest(Item):
-    """Effects of one curve that alone would explain most of the gap, and its share."""
+    """Effects of one curve that alone come closest, and the share they explain."""
 
     effects: tuple[EffectName, ...]
     explains: float
@@ -66,8 +66,8 @@ class HowFar(Item):
 
     `closed` is the share that the acting effects close on rows that they were not
     fitted to, None without any; `left_out` is what was left out of each fit. `nearest`
-    are effects that do not act, where something outside the library explains more than
-    any that does.
+    are effects that do not act, but would explain half of the gap or more, where
+    something outside the library explains more than any that acts.
     """
 
     ladder: tuple[Rung, ...]

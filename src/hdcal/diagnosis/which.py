@@ -27,7 +27,7 @@ def together(effects: Sequence[str]) -> str:
 
 
 def either(members: Sequence[str]) -> str:
-    """Return effects that are not separated: `a, b or c`, the most probable first."""
+    """Return effects that are not separated in a sentence: `a, b or c`."""
     words = [*map(label, members)]
     if len(words) > _MOST:
         others = len(words) - _MOST + 1
@@ -162,9 +162,11 @@ class Which(Item):
 
     @property
     def mostly_outside(self) -> bool:
-        """Whether something outside the library explains more than any effect."""
-        if self.outside.probability <= LIKELY or not self.on_mean:
-            return self.outside.probability > LIKELY
+        """Whether something outside acts and explains more than any acting effect."""
+        if self.outside.probability <= LIKELY:
+            return False
+        if not self.on_mean:
+            return True
         most, rest = self.on_mean[0].explains, self.outside.explains
         return bool(most and rest and rest.median > most.median)
 

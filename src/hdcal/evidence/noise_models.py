@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import betaln, entr, expit
 from scipy.stats import hypergeom
 
@@ -142,7 +142,7 @@ def outliers(
 ) -> list[NoiseModel]:
     """Return the outlier model as weights of rows, by a variational bound.
 
-    The list is empty where wild rows agree with their neighbours: that is structure.
+    The list is empty where wild rows are neighbours or recur: that is structure.
     With any probabilities that rows are wild the evidence of every hypothesis is a
     lower bound, tight where rows are clearly wild or not; these come from an EM fit.
     `fitted` maps weights of rows to the mean reading given some hypothesis.
@@ -163,14 +163,14 @@ def outliers(
 def _fit_outliers(problem: LinearProblem, ratio: float, fitted) -> _Fit:
     a, b = _beta_numbers(problem.priors[f"{OUTLIERS}.fraction"])
     count, share = len(problem.y), a / (a + b)
-    error = problem.y - fitted(np.ones(count))
+    error = problem.weight * (problem.y - fitted(problem.weight))
     sd = float(np.median(np.abs(error))) / MEDIAN_SIZE + 1e-300
     wild, weight = np.zeros(count), np.ones(count)
     for _ in range(_STEPS):
         log_odds = np.log(share / (1.0 - share)) - np.log(ratio)
         wild = expit(log_odds + 0.5 * (error / sd) ** 2 * (1.0 - ratio**-2.0))
         weight = np.sqrt(1.0 - wild + wild / ratio**2)
-        error = problem.y - fitted(weight)
+        error = problem.weight * (problem.y - fitted(problem.weight * weight))
         sd = float(np.sqrt(np.mean((weight * error) ** 2))) + 1e-300
         share = (a + wild.sum()) / (a + b + count)
     many = wild.sum()
@@ -195,28 +195,30 @@ def _beta_numbers(prior: Prior) -> tuple[float, float]:
 def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     """Whether wild errors [N] are not at random rows, either in time or in a cycle.
 
-    Rows that are not wild have an error of 0. A disturbance may last for two readings.
-    The order of a cycle is that of the deformation upwards and then downwards. Of
-    disturbances at random rows the number of runs of one sign is hypergeometric (Wald
-    and Wolfowitz, Ann. Math. Stat. 11, 1940), and several cycles have them at few
-    places of a cycle by chance only.
+    Rows that are not wild have an error of 0. The order of a cycle is that of the
+    deformation upwards and then downwards. At random rows errors of one sign are rarely
+    neighbours in either order, and rarely at few places of several cycles.
     """
     records, rows = problem.records, np.arange(len(wild))
     begins = np.diff(np.sign(wild), prepend=0.0) != 0.0
     age = rows - np.maximum.accumulate(np.where(begins, rows, 0))
+    # A disturbance may last for two readings.
     disturbed = np.where(age % 2 == 0, np.sign(wild), 0.0)
     count = np.count_nonzero(disturbed)
     if count < 2:
         return False
     cycle = np.lexsort([records.sense * records.deformation, -records.sense])
-    numbers = len(rows), len(rows) - count + 1, count
-    runs = [_runs(np.sign(wild)), _runs(disturbed[cycle])]
-    chances = [hypergeom.cdf(each, *numbers) for each in runs]
-    cycles = max(int(half_cycles(records)[-1] + 1) // 2, 1)
-    # Places have a row of each cycle, and may begin at any of so many rows.
-    found = np.arange(cycles)[:, None] + np.flatnonzero(disturbed[cycle])
-    fewest = min(len(np.unique(each)) for each in found // cycles)
-    chances.append(cycles * _few_places(fewest, count, cycles, len(rows)))
+    chances = [
+        _few_runs(_runs(np.sign(wild)), count, max(len(rows) // 2, count)),
+        _few_runs(_runs(disturbed[cycle]), count, len(rows)),
+    ]
+    half = half_cycles(records)
+    first = np.unique(half, return_index=True)[1]
+    cycles = max(np.unique(records.sense[first], return_counts=True)[1])
+    if cycles > 1:
+        chances.append(
+            _at_few_places(disturbed[cycle], half_cycles(records)[cycle], cycles)
+        )
     return bool(np.min(chances) < _CHANCE / len(chances))
 
 
@@ -226,10 +228,36 @@ def _runs(signs: Float[np.ndarray, " n"]) -> int:
     return np.count_nonzero(begins & (signs != 0.0))
 
 
+def _few_runs(most: int, count: int, rows: int) -> float:
+    """Return the probability of so many runs at most of some of the rows.
+
+    It is hypergeometric (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940); runs of one
+    sign are at least as many.
+    """
+    return float(hypergeom.cdf(most, rows, rows - count + 1, count))
+
+
+def _at_few_places(
+    disturbed: Float[np.ndarray, " n"], half: Int[np.ndarray, " n"], cycles: int
+) -> float:
+    """Return the probability that random rows are at as few places of a cycle.
+
+    A place has as many rows as there are cycles, and may begin at any of so many rows.
+    Of a half cycle one row counts at a place: a burst is at one place of one cycle.
+    """
+    marked, least = np.flatnonzero(disturbed), 1.0
+    for start in range(cycles):
+        place = (start + marked) // cycles
+        count = len(np.unique([place, half[marked]], axis=1).T)
+        least = min(least, _few_places(len(np.unique(place)), count, cycles, len(half)))
+    return cycles * least
+
+
 def _few_places(most: int, count: int, size: int, rows: int) -> float:
     """Return the probability that random rows are at so many places of a size at most.
 
-    The rows are drawn one after the other, the next one at a place that has one or not.
+    The rows are drawn one after the other, the next one at a place that has one or not;
+    exact where the size divides the number of rows.
     """
     chance = np.ones(1)
     for drawn in range(count):

@@ -103,10 +103,9 @@ def label(name: str, theory: str = "", units: Quantities = FORCE) -> str:
     """Return the label of an effect, or of a parameter under a theory."""
     if name == "K" and theory == SPRING:
         return f"{units.stiffness} K"
-    effect, dot, parameter = name.partition(".")
+    effect, *parameter = name.split(".", 1)
     if name not in _PARAMETERS:
-        words = _EFFECTS.get(effect, effect.replace("_", " "))
-        return words + dot.replace(".", ": ") + parameter.replace("_", " ")
+        return ": ".join([_EFFECTS.get(effect, effect), *parameter]).replace("_", " ")
     text = _PARAMETERS[name][0]
     return text.format(load=units.load, displacement=units.displacement)
 
