@@ -9,6 +9,7 @@ from rigs import cycles, make_case, make_records
 
 from hdcal.diagnosis.diagnose import _stiffness
 from hdcal.diagnosis.refit import Refits, refit, rows_to_calibrate, weighed
+from hdcal.inference.model_average import LeftOut
 from hdcal.physics.registry import EFFECTS
 
 
@@ -151,3 +152,5 @@ def test_only_stiffnesses_of_one_meaning_are_averaged(names, averaged: bool):
     models = {name: (0.5, beside(plain, name)) for name in names}
     found = _stiffness(Refits(models, None, ()))
     assert (found is not None) == averaged
+    # Of most hypotheses none is calibrated.
+    assert _stiffness(Refits(models, LeftOut(0.6, names[0]), ())) is None

@@ -11,7 +11,9 @@ from schema_checks import obeys
 
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
+from hdcal.data.reading import read_case
 from hdcal.diagnosis.diagnose import diagnose
+from hdcal.diagnosis.many_cases import Diagnoses
 from hdcal.diagnosis.result import Diagnosis
 from hdcal.errors import InputError
 from hdcal.physics.effect import Effect, parameter
@@ -140,6 +142,31 @@ def test_forces_without_scatter_and_falling_forces_are_refused(force, words: str
     records = ramp(20)
     with pytest.raises(InputError, match=words):
         quick(with_force(records, force(records.deformation)))
+
+
+def test_the_overview_names_what_acts_in_each_case():
+    loop = simulated(rich(), HYSTERESIS, seed=1)
+    plain = simulated(rich(), seed=1)
+    force = np.array(plain.records.force)
+    force[np.random.default_rng(3).choice(180, 9, replace=False)] += 6.0
+    wild = replace(plain, records=replace(plain.records, force=force))
+    found = quick(loop), quick(loop, library={}), quick(wild)
+    causes = {"loop": "hysteresis", "odd": "outside the library", "wild": "outliers"}
+    cases = {name: one.to_dict() for name, one in zip(causes, found, strict=True)}
+    text = Diagnoses(cases=cases, refused={}).text()
+    rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
+    assert all(cause in rows[name] for name, cause in causes.items())
+
+
+def test_a_part_that_yields_and_is_unloaded_may_fall_as_a_whole():
+    """A line through all readings falls; from row to row the force rises."""
+    up, down = np.linspace(0.0, 1.0, 40), np.linspace(1.0, 0.9, 20)[1:]
+    x = np.append(up, down)
+    force = np.append(np.minimum(200.0 * up, 20.0), 20.0 - 200.0 * (1.0 - down))
+    assert np.polyfit(x, force, 1)[0] < 0.0
+    force += np.random.default_rng(1).normal(0.0, 0.1, 59)
+    cause = quick(read_case({"deformation_mm": x, "force_N": force})).which.on_mean[0]
+    assert cause.probability > 0.9 and "plastic_yield" in cause.members
 
 
 def test_what_is_no_case_no_library_and_no_seed_is_refused():

@@ -110,6 +110,17 @@ def test_loading_or_shape_separates_yield_from_saturation(softening, path, alike
     assert excluded != alike
 
 
+def test_without_unloading_a_loop_and_a_yield_are_one_class():
+    """A bar that yields at a twelfth of its extension; its curve alone is no loop."""
+    case = simulated(make_records(np.linspace(0.0, 0.6, 120)), seed=1)
+    x, noise = np.asarray(case.records.deformation), np.random.default_rng(1)
+    force = 400.0 * np.minimum(x, 0.05) + 2.0 * x + noise.normal(0.0, 0.1, 120)
+    cause = class_of(decide(with_force(case, force)), "plastic_yield")
+    assert cause.probability > 0.9 and {"hysteresis", "plastic_yield"} <= {
+        *cause.members
+    }
+
+
 def test_a_bend_upwards_is_in_no_class_with_one_downwards():
     records = make_records(np.linspace(0.02, 0.54, 40))
     bend = {"progressive_stiffening": {"slope": 1.0}}

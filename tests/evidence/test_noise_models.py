@@ -1,5 +1,6 @@
 """Outliers by a bound of the sum over all assignments; noise as it was simulated."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -105,17 +106,47 @@ def test_outliers_do_not_agree_with_neighbours(place: str, sides: list, found: b
     assert bool(outliers(problem, 0.0, fitted)) == found
 
 
+def test_a_stated_sd_of_a_reading_makes_it_no_outlier():
+    """Every tenth reading scatters ten times as much, as it is stated."""
+    rows, rng = 240, np.random.default_rng(2)
+    sd = np.where(np.arange(rows) % 10 == rng.integers(10), 10.0 * NOISE, 0.0)
+    problem = problem_of(rng.normal(0.0, np.hypot(NOISE, sd)))
+    problem = replace(problem, weight=NOISE / np.hypot(NOISE, sd))
+
+    def fitted(weight):
+        return posterior(problem, NoiseModel("", weight, 0.0, 0.0), []).reading
+
+    models = outliers(problem, 0.0, fitted)
+    np.testing.assert_allclose(models[0].weight / problem.weight, 1.0, atol=0.05)
+
+
 @pytest.mark.parametrize(
-    ("place", "found"), [("turn", False), ("burst", True), ("random", True)]
+    ("place", "found"),
+    [
+        ("turn", False),
+        ("burst", True),
+        ("slow", True),
+        ("held", True),
+        ("random", True),
+    ],
 )
 def test_outliers_do_not_recur_at_a_place_of_the_cycle(place: str, found: bool):
-    """Errors of either side; a burst is at one place too, of one cycle."""
+    """Errors of either side; a burst is at one place too, of one cycle.
+
+    The first cycle may be slow, or a deformation may be held for many rows.
+    """
     rows, rng = 480, np.random.default_rng(4)
     step = np.arange(rows) % 60
+    if place == "slow":
+        step = np.append(np.arange(240) // 4, np.arange(240) % 60)
     order, sense = np.minimum(step, 59 - step), np.where(step < 30, 1.0, -1.0)
+    if place == "held":
+        order = np.minimum(order, 15)
     some = {
         "turn": np.arange(1, rows, 60),
         "burst": np.arange(100, 108),
+        "slow": np.arange(100, 108),
+        "held": np.arange(78, 86),
         "random": rng.choice(rows, 8, replace=False),
     }[place]
     error = rng.normal(0.0, NOISE, rows)
