@@ -43,9 +43,9 @@ _DRAWS = 200
 _LEAST_ROWS = 12
 # Efficiency of the median of absolute errors.
 _EFFICIENCY = 0.37
-# An outlier deviates by at least so many sds and has at least this share of the sum of
-# squares. More than so many are not reported: they are jumps of a rig or long tails.
-_OUTLIER, _SHARE, _MAX_OUTLIERS = 12.0, 0.02, 3
+# An outlier deviates by at least so many sds; the largest has at least this share of the
+# sum of squares: others change no result.
+_OUTLIER, _SHARE = 12.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def _outlier(left: _Errors, records: Records, sd: np.ndarray) -> ResidualFinding
     # The innovation of the row after an outlier is large as well.
     count = int(np.sum(np.diff(outliers, prepend=-2) > 1))
     dominates = far[row] ** 2 >= _SHARE * float(far @ far)
-    is_outlier = 0 < count <= _MAX_OUTLIERS and dominates
+    is_outlier = count > 0 and dominates
     others = f" ({count} such readings)" if count > 1 else ""
     distance = float(far[row] * sd[row])
     force, deformation = (float(v[row]) for v in (records.force, records.deformation))
