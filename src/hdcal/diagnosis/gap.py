@@ -42,7 +42,8 @@ class Fitted:
     """The likeliest hypothesis with some effects, fitted to all rows.
 
     `noise_sd` is that of a typical row [N]; `rms` what the base model leaves, then with
-    each effect in addition, then with a remainder [N], by what was added last.
+    each named effect in addition, then with a remainder and all other effects [N], by
+    what was added last.
     """
 
     noise: NoiseModel
@@ -83,13 +84,16 @@ def fitted(
     )
     noise, parts = table.likeliest_noise(key), table.parts[key]
     by_name = {table.names[part.component]: part for part in parts}
-    rms, added = {}, []
-    for name in ("", *names, *({*key} - {*names} - {OUTSIDE}), OUTSIDE):
-        if name in by_name:
-            added.append(by_name[name])
-        if name in by_name or not name:
-            left = problem.y - posterior(problem, noise, added).reading
-            rms[name] = float(np.sqrt(np.mean(left**2)))
+    named = [name for name in names if name in by_name]
+    steps = {
+        name: [by_name[n] for n in named[:k]] for k, name in enumerate(["", *named])
+    }
+    if OUTSIDE in by_name:
+        steps[OUTSIDE] = parts
+    rms = {}
+    for name, some in steps.items():
+        left = problem.y - posterior(problem, noise, some).reading
+        rms[name] = float(np.sqrt(np.mean(left**2)))
     found = posterior(problem, noise, parts)
     left = (problem.y - found.reading) * noise.weight
     used = len(found.mean) - float(np.sum(found.factor**2))
