@@ -204,7 +204,7 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     age = rows - np.maximum.accumulate(np.where(begins, rows, 0))
     # A disturbance may last for two readings.
     disturbed = np.where(age % 2 == 0, np.sign(wild), 0.0)
-    count = np.count_nonzero(disturbed)
+    count = int(np.count_nonzero(disturbed))
     if count < 2:
         return False
     cycle = np.lexsort([records.sense * records.deformation, -records.sense])
@@ -225,7 +225,7 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
 def _runs(signs: Float[np.ndarray, " n"]) -> int:
     """Return the number of runs of one sign."""
     begins = np.diff(signs, prepend=0.0) != 0.0
-    return np.count_nonzero(begins & (signs != 0.0))
+    return int(np.count_nonzero(begins & (signs != 0.0)))
 
 
 def _few_runs(most: int, count: int, rows: int) -> float:

@@ -43,8 +43,8 @@ _DRAWS = 200
 _LEAST_ROWS = 12
 # Efficiency of the median of absolute errors.
 _EFFICIENCY = 0.37
-# An outlier deviates by at least so many sds. Where the largest has less than this share
-# of the sum of squares, it changes no result.
+# An outlier deviates by at least so many sds. With less than this share of the sum of
+# squares the largest one changes no result.
 _OUTLIER, _SHARE = 12.0, 0.02
 
 
