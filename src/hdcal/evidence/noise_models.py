@@ -32,8 +32,9 @@ _SPANS, _LARGEST, _WORTHWHILE = 5.0, 0.98, 0.75
 _GROWTH = 2.0 ** np.arange(-0.5, 4.0)
 # Steps of the EM fit of outliers, and quantiles of the ratio of their noise.
 _STEPS, _RATIOS = 15, 3
-# Significance level of the tests of where outliers lie.
-_CHANCE = 0.01
+# Significance level of the tests of where outliers lie, and the most rows at which
+# places of a cycle are tried to begin.
+_CHANCE, _STARTS = 0.01, 12
 
 
 class NoiseModel(NamedTuple):
@@ -208,6 +209,7 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     if count < 2:
         return False
     cycle = np.lexsort([records.sense * records.deformation, -records.sense])
+    # In time two readings of a disturbance are one of half as many rows.
     chances = [
         _few_runs(_runs(np.sign(wild)), count, max(len(rows) // 2, count)),
         _few_runs(_runs(disturbed[cycle]), count, len(rows)),
@@ -216,9 +218,7 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     first = np.unique(half, return_index=True)[1]
     cycles = max(np.unique(records.sense[first], return_counts=True)[1])
     if cycles > 1:
-        chances.append(
-            _at_few_places(disturbed[cycle], half_cycles(records)[cycle], cycles)
-        )
+        chances.append(_at_few_places(disturbed[cycle], half[cycle], cycles))
     return bool(np.min(chances) < _CHANCE / len(chances))
 
 
@@ -242,15 +242,16 @@ def _at_few_places(
 ) -> float:
     """Return the probability that random rows are at as few places of a cycle.
 
-    A place has as many rows as there are cycles, and may begin at any of so many rows.
-    Of a half cycle one row counts at a place: a burst is at one place of one cycle.
+    A place has as many rows as there are cycles, and begins at one of several rows. Of
+    a half cycle one row counts at a place: a burst is at one place of one cycle.
     """
     marked, least = np.flatnonzero(disturbed), 1.0
-    for start in range(cycles):
+    starts = np.unique(np.linspace(0, cycles - 1, _STARTS).astype(int))
+    for start in starts:
         place = (start + marked) // cycles
         count = len(np.unique([place, half[marked]], axis=1).T)
         least = min(least, _few_places(len(np.unique(place)), count, cycles, len(half)))
-    return cycles * least
+    return len(starts) * least
 
 
 def _few_places(most: int, count: int, size: int, rows: int) -> float:
