@@ -201,7 +201,7 @@ def _how_far(
     closed, word, nearest = None, "", None
     if names := [cause.members[0] for cause in which.on_mean]:
         closed, word = closed_on_left_out(searched, fit, names, rng)
-    if which.mostly_outside and searched.components.names:
+    if which.mostly_outside:
         effects, share = nearest_effects(searched, fit)
         acting = {name for cause in which.on_mean for name in cause.members}
         if share >= CARRIED and acting.isdisjoint(effects):
@@ -215,12 +215,7 @@ def _how_far(
     wild = fit.noise.name == OUTLIERS
     noise = "noise without outliers" if wild else "noise"
     ladder.append(Rung(model=noise, rms_N=fit.noise_sd))
-    return HowFar(
-        ladder=tuple(ladder),
-        closed=closed,
-        left_out=word,
-        nearest=nearest,
-    )
+    return HowFar(ladder=tuple(ladder), closed=closed, left_out=word, nearest=nearest)
 
 
 def _formula(case: Case, searched: Searched) -> Rung:

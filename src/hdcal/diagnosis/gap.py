@@ -105,16 +105,18 @@ def nearest_effects(searched: Searched, fit: Fitted) -> tuple[tuple[str, ...], f
     """Return the effect that explains most of the gap alone, and its share of it.
 
     Effects whose curves coincide with its own follow it. The share is 1 − √(G₁/G₀), G
-    the mean square of what is left beyond the noise of a fit, which weighs the rows;
-    NaN where that is nothing.
+    the mean square of what is left beyond the noise of a fit, which weighs the rows.
+    It is NaN where the base model leaves no more, or no effect was evaluated.
     """
     problem, table, left = searched.problem, searched.table, {}
-    for key in [(), *table.ranked(1)]:
-        if key != (OUTSIDE,):
-            found = posterior(problem, fit.noise, table.parts[key])
-            square = np.mean(((problem.y - found.reading) * fit.noise.weight) ** 2)
-            left[key] = float(square) - fit.noise_sd**2
-    first, *others = sorted(left.keys() - {()}, key=lambda key: left[key])
+    alone = [key for key in table.ranked(1) if key != (OUTSIDE,)]
+    if not alone:
+        return (), np.nan
+    for key in [(), *alone]:
+        found = posterior(problem, fit.noise, table.parts[key])
+        square = np.mean(((problem.y - found.reading) * fit.noise.weight) ** 2)
+        left[key] = float(square) - fit.noise_sd**2
+    first, *others = sorted(alone, key=lambda key: left[key])
     curve = direction(searched, first, *first)
     alike = [k for k in others if curve @ direction(searched, k, *k) >= ALIKE]
     share = float(_closed(left[()], left[first]))
