@@ -74,8 +74,7 @@ def diagnose(
     searched = search(case, effects)
     found = decide(searched, seed=seed)
     posterior = searched.table.posterior(TEMPERATURE)
-    names = [cause.members[0] for cause in found.which.on_mean]
-    fit = fitted(searched, posterior, names)
+    fit = fitted(searched, posterior, found.which.leaders)
     excluded = [
         f"{label(name)} is excluded: the gear file fixes its amplitude at zero"
         for name in searched.excluded
@@ -199,8 +198,8 @@ def _how_far(
     rng: np.random.Generator,
 ) -> HowFar:
     closed, word, nearest = None, "", None
-    if names := [cause.members[0] for cause in which.on_mean]:
-        closed, word = closed_on_left_out(searched, fit, names, rng)
+    if which.on_mean:
+        closed, word = closed_on_left_out(searched, fit, which.leaders, rng)
     if which.mostly_outside:
         effects, share = nearest_effects(searched, fit)
         acting = {name for cause in which.on_mean for name in cause.members}

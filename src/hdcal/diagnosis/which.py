@@ -161,6 +161,11 @@ class Which(Item):
         return tuple(sorted(found, key=lambda each: -shares[each]))
 
     @property
+    def leaders(self) -> tuple[EffectName, ...]:
+        """The likeliest effect of each acting class on the mean reading."""
+        return tuple(each.members[0] for each in self.on_mean)
+
+    @property
     def mostly_outside(self) -> bool:
         """Whether something outside acts and explains more than any acting effect."""
         if self.outside.probability <= LIKELY:

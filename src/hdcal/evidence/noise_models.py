@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.special import betaln, entr, expit
 from scipy.stats import hypergeom
 
@@ -200,19 +200,18 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     deformation upwards and then downwards. At random rows errors of one sign are rarely
     neighbours in either order, and rarely at few places of several cycles.
     """
-    records, rows = problem.records, np.arange(len(wild))
-    begins = np.diff(np.sign(wild), prepend=0.0) != 0.0
-    age = rows - np.maximum.accumulate(np.where(begins, rows, 0))
+    records, rows, side = problem.records, np.arange(len(wild)), np.sign(wild)
+    age = rows - np.maximum.accumulate(np.where(_begins(side), rows, 0))
     # A disturbance may last for two readings.
-    disturbed = np.where(age % 2 == 0, np.sign(wild), 0.0)
+    disturbed = np.where(age % 2 == 0, side, 0.0)
     count = int(np.count_nonzero(disturbed))
     if count < 2:
         return False
     cycle = np.lexsort([records.sense * records.deformation, -records.sense])
     # In time two readings of a disturbance are one of half as many rows.
     chances = [
-        _few_runs(_runs(np.sign(wild)), count, max(len(rows) // 2, count)),
-        _few_runs(_runs(disturbed[cycle]), count, len(rows)),
+        _few_runs(side, count, max(len(rows) // 2, count)),
+        _few_runs(disturbed[cycle], count, len(rows)),
     ]
     half = half_cycles(records)
     first = np.unique(half, return_index=True)[1]
@@ -222,19 +221,19 @@ def _clustered(problem: LinearProblem, wild: Float[np.ndarray, " n"]) -> bool:
     return bool(np.min(chances) < _CHANCE / len(chances))
 
 
-def _runs(signs: Float[np.ndarray, " n"]) -> int:
-    """Return the number of runs of one sign."""
-    begins = np.diff(signs, prepend=0.0) != 0.0
-    return int(np.count_nonzero(begins & (signs != 0.0)))
+def _begins(side: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Whether each row has another sign than the one before."""
+    return np.diff(side, prepend=0.0) != 0.0
 
 
-def _few_runs(most: int, count: int, rows: int) -> float:
-    """Return the probability of so many runs at most of some of the rows.
+def _few_runs(side: Float[np.ndarray, " n"], count: int, rows: int) -> float:
+    """Return the probability that random rows have as few runs of one sign.
 
-    It is hypergeometric (Wald and Wolfowitz, Ann. Math. Stat. 11, 1940); runs of one
-    sign are at least as many.
+    That of runs of any sign is hypergeometric (Wald and Wolfowitz, Ann. Math. Stat. 11,
+    1940); those of one sign are at least as many.
     """
-    return float(hypergeom.cdf(most, rows, rows - count + 1, count))
+    runs = np.count_nonzero(_begins(side) & (side != 0.0))
+    return float(hypergeom.cdf(runs, rows, rows - count + 1, count))
 
 
 def _at_few_places(
